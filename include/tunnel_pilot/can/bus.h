@@ -1,0 +1,33 @@
+#pragma once
+
+#include <optional>
+
+#include "tunnel_pilot/can/frame.h"
+
+namespace tunnel_pilot::can {
+
+/// State of a bus as its controller tells it (SocketCAN's error states and link).
+enum class BusState { kActive, kWarning, kPassive, kBusOff, kDown };
+
+/// A CAN bus seen from one participant. A participant does not receive its own frames (their echo, where
+/// a bus has one, is told through `confirmed()`). Non-blocking; never throws after construction.
+class Bus {
+ public:
+  virtual ~Bus() = default;
+
+  /// False when the frame was not taken (queue full, link down): it is dropped, never sent late.
+  virtual bool send(const Frame& frame) = 0;
+
+  /// Next frame received, if any.
+  virtual std::optional<Frame> receive() = 0;
+
+  /// Number of own frames whose transmission is proven (echo on a real bus).
+  virtual std::uint64_t confirmed() const = 0;
+
+  virtual BusState state() const = 0;
+
+  /// File descriptor that polls readable when frames wait, or -1 where there is none.
+  virtual int descriptor() const = 0;
+};
+
+}  // namespace tunnel_pilot::can

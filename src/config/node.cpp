@@ -1,0 +1,150 @@
+#include "tunnel_pilot/config/node.h"
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <utility>
+
+namespace tunnel_pilot::config {
+namespace {
+
+constexpr std::uintmax_t kMaxFileBytes = 4u << 20;
+
+// yaml-cpp marks a quoted scalar with the tag "!": "3" in quotes is text, never a number.
+bool isPlainScalar(const YAML::Node& value) { return value.IsScalar() && value.Tag() != "!"; }
+
+std::string range(const std::string& unit, double min, double max) {
+  std::ostringstream out;
+  out << "[" << unit << "] in [" << min << ", " << max << "]";
+  return out.str();
+}
+
+}  // namespace
+
+Node::Node(YAML::Node yaml, std::string source, std::string path)
+    : yaml_(std::move(yaml)), source_(std::move(source)), path_(std::move(path)) {
+  if (!yaml_.IsMap()) {
+    throw ConfigError(source_ + ": " + (path_.empty() ? "the file" : "'" + path_ + "'") +
+                      " must be a map of keys");
+  }
+}
+
+std::string Node::name(const std::string& key) const { return path_.empty() ? key : path_ + "." + key; }
+
+void Node::refuse(const std::string& key, const std::string& why) const {
+  throw ConfigError(source_ + ": '" + name(key) + "' " + why);
+}
+
+bool Node::has(const std::string& key) const {
+  const YAML::Node& map = yaml_;
+  return map[key].IsDefined();
+}
+
+YAML::Node Node::take(const std::string& key) {
+  if (!has(key)) refuse(key, "is missing");
+  read_.insert(key);
+  const YAML::Node& map = yaml_;
+  return map[key];
+}
+
+double Node::parseNumber(const YAML::Node& value, const std::string& key, const std::string& unit,
+                         double min, double max) const {
+  double number = 0.0;
+  if (!isPlainScalar(value) || !YAML::convert<double>::decode(value, number)) {
+    refuse(key, "must be a number " + range(unit, min, max));
+  }
+  if (!std::isfinite(number) || number < min || number > max) {
+    refuse(key, "= " + value.Scalar() + " must be a number " + range(unit, min, max));
+  }
+  return number;
+}
+
+double Node::number(const std::string& key, const std::string& unit, double min, double max) {
+  return parseNumber(take(key), key, unit, min, max);
+}
+
+std::int64_t Node::integer(const std::string& key, const std::string& unit, std::int64_t min,
+                           std::int64_t max) {
+  const YAML::Node value = take(key);
+  const std::string wanted =
+      "must be a whole number " + range(unit, static_cast<double>(min), static_cast<double>(max));
+  std::int64_t number = 0;
+  if (!isPlainScalar(value) || !YAML::convert<std::int64_t>::decode(value, number)) refuse(key, wanted);
+  if (number < min || number > max) refuse(key, "= " + value.Scalar() + " " + wanted);
+  return number;
+}
+
+bool Node::boolean(const std::string& key) {
+  const YAML::Node value = take(key);
+  bool flag = false;
+  if (!isPlainScalar(value) || !YAML::convert<bool>::decode(value, flag)) {
+    refuse(key, "must be true or false");
+  }
+  return flag;
+}
+
+std::string Node::text(const std::string& key) {
+  const YAML::Node value = take(key);
+  if (!value.IsScalar()) refuse(key, "must be text");
+  return value.Scalar();
+}
+
+std::string Node::choice(const std::string& key, const std::vector<std::string>& allowed) {
+  const std::string value = text(key);
+  std::string list;
+  for (const std::string& candidate : allowed) {
+    if (candidate == value) return value;
+    list += (list.empty() ? "" : ", ") + candidate;
+  }
+  refuse(key, "= '" + value + "' must be one of: " + list);
+}
+
+std::vector<double> Node::numbers(const std::string& key, const std::string& unit, double min,
+                                  double max, std::size_t min_size, std::size_t max_size) {
+  const YAML::Node list = take(key);
+  if (!list.IsSequence() || list.size() < min_size || list.size() > max_size) {
+    refuse(key, "must be a list of " + std::to_string(min_size) + " to " + std::to_string(max_size) +
+                    " numbers " + range(unit, min, max));
+  }
+  std::vector<double> values;
+  values.reserve(list.size());
+  for (const YAML::Node& value : list) values.push_back(parseNumber(value, key, unit, min, max));
+  return values;
+}
+
+Node Node::child(const std::string& key) { return Node(take(key), source_, name(key)); }
+
+std::vector<Node> Node::children(const std::string& key) {
+  const YAML::Node list = take(key);
+  if (!list.IsSequence()) refuse(key, "must be a list");
+  std::vector<Node> nodes;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    nodes.emplace_back(list[i], source_, name(key) + "[" + std::to_string(i) + "]");
+  }
+  return nodes;
+}
+
+void Node::finish() const {
+  for (const auto& entry : yaml_) {
+    const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "(not a scalar)";
+    if (read_.count(key) == 0) refuse(key, "is unknown");
+  }
+}
+
+Node loadFile(const std::string& file) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) throw ConfigError(file + ": is not a file");
+  if (std::filesystem::file_size(file, error) > kMaxFileBytes) {
+    throw ConfigError(file + ": is larger than 4 MiB");
+  }
+  std::ifstream stream(file);
+  if (!stream) throw ConfigError(file + ": cannot be opened");
+  try {
+    return Node(YAML::Load(stream), file);
+  } catch (const YAML::Exception& e) {
+    throw ConfigError(file + ": is not YAML: " + e.what());
+  }
+}
+
+}  // namespace tunnel_pilot::config

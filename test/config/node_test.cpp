@@ -1,0 +1,77 @@
+#include <functional>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "tunnel_pilot/config/node.h"
+
+namespace tunnel_pilot::config {
+namespace {
+
+Node parse(const std::string& text) { return Node(YAML::Load(text), "truck.yaml"); }
+
+std::string messageOf(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const ConfigError& e) {
+    return e.what();
+  }
+  return "(no error)";
+}
+
+TEST(ConfigNode, ReadsWhatIsThere) {
+  Node node = parse("{a: 1.5, b: 3, c: text, d: true, e: [1, 2], f: {g: 2}}");
+  EXPECT_DOUBLE_EQ(node.number("a", "m", 0, 2), 1.5);
+  EXPECT_EQ(node.integer("b", "1", 0, 5), 3);
+  EXPECT_EQ(node.text("c"), "text");
+  EXPECT_TRUE(node.boolean("d"));
+  EXPECT_EQ(node.numbers("e", "m", 0, 5, 2, 2).size(), 2u);
+  Node f = node.child("f");
+  EXPECT_DOUBLE_EQ(f.number("g", "m", 0, 5), 2.0);
+  f.finish();
+  node.finish();
+}
+
+TEST(ConfigNode, OutOfRangeNamesFileKeyUnitAndRange) {
+  Node node = parse("{steering: {dead_time: -1}}");
+  Node child = node.child("steering");
+  EXPECT_EQ(messageOf([&] { child.number("dead_time", "s", 0, 1); }),
+            "truck.yaml: 'steering.dead_time' = -1 must be a number [s] in [0, 1]");
+}
+
+TEST(ConfigNode, MissingKeyIsNamed) {
+  Node node = parse("{a: 1}");
+  EXPECT_EQ(messageOf([&] { node.number("b", "m", 0, 1); }), "truck.yaml: 'b' is missing");
+}
+
+TEST(ConfigNode, UnknownKeyIsNamed) {
+  Node node = parse("{a: 1, typo: 2}");
+  node.number("a", "m", 0, 1);
+  EXPECT_EQ(messageOf([&] { node.finish(); }), "truck.yaml: 'typo' is unknown");
+}
+
+TEST(ConfigNode, QuotedNumberNanAndTextAreNotNumbers) {
+  for (const char* value : {"'3'", ".nan", ".inf", "three", "[1]", "{b: 1}", "~"}) {
+    Node node = parse(std::string("{a: ") + value + "}");
+    EXPECT_THROW(node.number("a", "m", 0, 5), ConfigError) << value;
+  }
+}
+
+TEST(ConfigNode, FractionIsNotAWholeNumber) {
+  Node node = parse("{a: 1.5}");
+  EXPECT_THROW(node.integer("a", "1", 0, 5), ConfigError);
+}
+
+TEST(ConfigNode, ListsOfWrongSizeAreRefused) {
+  Node node = parse("{a: [1, 2, 3]}");
+  EXPECT_THROW(node.numbers("a", "m", 0, 5, 2, 2), ConfigError);
+}
+
+TEST(ConfigNode, MissingFileDirectoryAndBrokenYamlAreRefused) {
+  EXPECT_THROW(loadFile("/does/not/exist.yaml"), ConfigError);
+  EXPECT_THROW(loadFile("/tmp"), ConfigError);
+  EXPECT_THROW(parse("[1, 2]"), ConfigError);
+}
+
+}  // namespace
+}  // namespace tunnel_pilot::config
