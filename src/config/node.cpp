@@ -22,8 +22,8 @@ std::string range(const std::string& unit, double min, double max) {
 
 }  // namespace
 
-Node::Node(YAML::Node yaml, std::string source, std::string path)
-    : yaml_(std::move(yaml)), source_(std::move(source)), path_(std::move(path)) {
+Node::Node(const YAML::Node& yaml, std::string source, std::string path)
+    : yaml_(yaml), source_(std::move(source)), path_(std::move(path)) {
   if (!yaml_.IsMap()) {
     throw ConfigError(source_ + ": " + (path_.empty() ? "the file" : "'" + path_ + "'") +
                       " must be a map of keys");
@@ -91,7 +91,7 @@ std::string Node::text(const std::string& key) {
 }
 
 std::string Node::choice(const std::string& key, const std::vector<std::string>& allowed) {
-  const std::string value = text(key);
+  std::string value = text(key);
   std::string list;
   for (const std::string& candidate : allowed) {
     if (candidate == value) return value;

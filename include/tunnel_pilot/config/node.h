@@ -23,7 +23,7 @@ class ConfigError : public std::runtime_error {
 class Node {
  public:
   /// `source` names the file or parameter namespace in messages; `path` is the key's way from its root.
-  Node(YAML::Node yaml, std::string source, std::string path = "");
+  Node(const YAML::Node& yaml, std::string source, std::string path = "");
 
   /// Number in [min, max]; `unit` such as "m", "rad", "1" stands in the message.
   double number(const std::string& key, const std::string& unit, double min, double max);
