@@ -14,20 +14,43 @@ constexpr std::uintmax_t kMaxFileBytes = 4u << 20;
 // yaml-cpp marks a quoted scalar with the tag "!": "3" in quotes is text, never a number.
 bool isPlainScalar(const YAML::Node& value) { return value.IsScalar() && value.Tag() != "!"; }
 
-std::string range(const std::string& unit, double min, double max) {
+std::string interval(double min, double max) {
   std::ostringstream out;
-  out << "[" << unit << "] in [" << min << ", " << max << "]";
+  out << "[" << min << ", " << max << "]";
   return out.str();
+}
+
+std::string range(const std::string& unit, double min, double max) {
+  return "[" + unit + "] in " + interval(min, max);
+}
+
+std::string flowText(const YAML::Node& value) {
+  YAML::Emitter out;
+  out << YAML::Flow << value;
+  return out.c_str();
 }
 
 }  // namespace
 
 Node::Node(const YAML::Node& yaml, std::string source, std::string path)
-    : yaml_(yaml), source_(std::move(source)), path_(std::move(path)) {
+    : yaml_(yaml),
+      source_(std::move(source)),
+      path_(std::move(path)),
+      records_(std::make_shared<std::vector<ParameterRecord>>()) {
   if (!yaml_.IsMap()) {
     throw ConfigError(source_ + ": " + (path_.empty() ? "the file" : "'" + path_ + "'") +
                       " must be a map of keys");
   }
+}
+
+Node::Node(const YAML::Node& yaml, const Node& parent, std::string path)
+    : Node(yaml, parent.source_, std::move(path)) {
+  records_ = parent.records_;
+}
+
+void Node::record(const std::string& key, const std::string& unit, const std::string& allowed,
+                  const YAML::Node& value) {
+  records_->push_back({name(key), unit, allowed, flowText(value)});
 }
 
 std::string Node::name(const std::string& key) const { return path_.empty() ? key : path_ + "." + key; }
@@ -61,12 +84,15 @@ double Node::parseNumber(const YAML::Node& value, const std::string& key, const 
 }
 
 double Node::number(const std::string& key, const std::string& unit, double min, double max) {
-  return parseNumber(take(key), key, unit, min, max);
+  const YAML::Node value = take(key);
+  record(key, unit, interval(min, max), value);
+  return parseNumber(value, key, unit, min, max);
 }
 
 std::int64_t Node::integer(const std::string& key, const std::string& unit, std::int64_t min,
                            std::int64_t max) {
   const YAML::Node value = take(key);
+  record(key, unit, interval(static_cast<double>(min), static_cast<double>(max)), value);
   const std::string wanted =
       "must be a whole number " + range(unit, static_cast<double>(min), static_cast<double>(max));
   std::int64_t number = 0;
@@ -77,6 +103,7 @@ std::int64_t Node::integer(const std::string& key, const std::string& unit, std:
 
 bool Node::boolean(const std::string& key) {
   const YAML::Node value = take(key);
+  record(key, "", "true, false", value);
   bool flag = false;
   if (!isPlainScalar(value) || !YAML::convert<bool>::decode(value, flag)) {
     refuse(key, "must be true or false");
@@ -86,6 +113,7 @@ bool Node::boolean(const std::string& key) {
 
 std::string Node::text(const std::string& key) {
   const YAML::Node value = take(key);
+  record(key, "", "text", value);
   if (!value.IsScalar()) refuse(key, "must be text");
   return value.Scalar();
 }
@@ -93,9 +121,10 @@ std::string Node::text(const std::string& key) {
 std::string Node::choice(const std::string& key, const std::vector<std::string>& allowed) {
   std::string value = text(key);
   std::string list;
+  for (const std::string& candidate : allowed) list += (list.empty() ? "" : ", ") + candidate;
+  records_->back().range = list;
   for (const std::string& candidate : allowed) {
     if (candidate == value) return value;
-    list += (list.empty() ? "" : ", ") + candidate;
   }
   refuse(key, "= '" + value + "' must be one of: " + list);
 }
@@ -103,6 +132,7 @@ std::string Node::choice(const std::string& key, const std::vector<std::string>&
 std::vector<double> Node::numbers(const std::string& key, const std::string& unit, double min,
                                   double max, std::size_t min_size, std::size_t max_size) {
   const YAML::Node list = take(key);
+  record(key, unit, interval(min, max) + " each", list);
   if (!list.IsSequence() || list.size() < min_size || list.size() > max_size) {
     refuse(key, "must be a list of " + std::to_string(min_size) + " to " + std::to_string(max_size) +
                     " numbers " + range(unit, min, max));
@@ -113,14 +143,14 @@ std::vector<double> Node::numbers(const std::string& key, const std::string& uni
   return values;
 }
 
-Node Node::child(const std::string& key) { return Node(take(key), source_, name(key)); }
+Node Node::child(const std::string& key) { return Node(take(key), *this, name(key)); }
 
 std::vector<Node> Node::children(const std::string& key) {
   const YAML::Node list = take(key);
   if (!list.IsSequence()) refuse(key, "must be a list");
   std::vector<Node> nodes;
   for (std::size_t i = 0; i < list.size(); ++i) {
-    nodes.emplace_back(list[i], source_, name(key) + "[" + std::to_string(i) + "]");
+    nodes.push_back(Node(list[i], *this, name(key) + "[" + std::to_string(i) + "]"));
   }
   return nodes;
 }

@@ -67,6 +67,19 @@ TEST(ConfigNode, ListsOfWrongSizeAreRefused) {
   EXPECT_THROW(node.numbers("a", "m", 0, 5, 2, 2), ConfigError);
 }
 
+TEST(ConfigNode, RecordsTellKeyUnitRangeAndValue) {
+  Node node = parse("{steering: {dead_time: 0.15}, kind: a}");
+  Node child = node.child("steering");
+  child.number("dead_time", "s", 0, 1);
+  node.choice("kind", {"a", "b"});
+  ASSERT_EQ(node.records().size(), 2u);
+  EXPECT_EQ(node.records()[0].key, "steering.dead_time");
+  EXPECT_EQ(node.records()[0].unit, "s");
+  EXPECT_EQ(node.records()[0].range, "[0, 1]");
+  EXPECT_EQ(node.records()[0].value, "0.15");
+  EXPECT_EQ(node.records()[1].range, "a, b");
+}
+
 TEST(ConfigNode, MissingFileDirectoryAndBrokenYamlAreRefused) {
   EXPECT_THROW(loadFile("/does/not/exist.yaml"), ConfigError);
   EXPECT_THROW(loadFile("/tmp"), ConfigError);

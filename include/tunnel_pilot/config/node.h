@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -14,6 +15,14 @@ namespace tunnel_pilot::config {
 class ConfigError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
+};
+
+/// What one read told of a parameter: the tables of the documentation are made from these.
+struct ParameterRecord {
+  std::string key;    ///< the key's way from the file's root
+  std::string unit;   ///< empty for text and flags
+  std::string range;  ///< "[min, max]" or the allowed words
+  std::string value;  ///< as it stands in the file
 };
 
 /// Strict reading of one YAML map: every key that is asked for must be there, of the right type and in
@@ -51,7 +60,13 @@ class Node {
 
   const std::string& source() const { return source_; }
 
+  /// All reads from the file so far, its nested maps' included, in their order.
+  const std::vector<ParameterRecord>& records() const { return *records_; }
+
  private:
+  Node(const YAML::Node& yaml, const Node& parent, std::string path);
+  void record(const std::string& key, const std::string& unit, const std::string& range,
+              const YAML::Node& value);
   YAML::Node take(const std::string& key);
   std::string name(const std::string& key) const;
   double parseNumber(const YAML::Node& value, const std::string& key, const std::string& unit,
@@ -61,6 +76,7 @@ class Node {
   std::string source_;
   std::string path_;
   std::set<std::string> read_;
+  std::shared_ptr<std::vector<ParameterRecord>> records_;
 };
 
 /// Reads a YAML file of at most 4 MiB as one map. Throws ConfigError when it cannot be opened or parsed.
