@@ -1,0 +1,184 @@
+#include <cstring>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <linux/can.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "tunnel_pilot/can/embedded_bus.h"
+#include "tunnel_pilot/can/memory_bus.h"
+
+namespace tunnel_pilot::can {
+namespace {
+
+Frame makeFrame(std::uint32_t id, std::uint8_t first_byte = 0) {
+  Frame frame;
+  frame.id = id;
+  frame.length = 8;
+  frame.data[0] = first_byte;
+  return frame;
+}
+
+std::string uniqueName(const std::string& what) { return what + "_" + std::to_string(getpid()); }
+
+TEST(MemoryBus, ReachesAllOthersInOrderAndNotTheSender) {
+  MemoryBusHub hub;
+  const auto a = hub.connect(), b = hub.connect(), c = hub.connect();
+  a->send(makeFrame(1));
+  b->send(makeFrame(2));
+  for (Bus* bus : {c.get()}) {
+    EXPECT_EQ(bus->receive()->id, 1u);
+    EXPECT_EQ(bus->receive()->id, 2u);
+    EXPECT_FALSE(bus->receive());
+  }
+  EXPECT_EQ(a->receive()->id, 2u);
+  EXPECT_FALSE(a->receive());
+}
+
+TEST(MemoryBus, SendsNothingWhileDown) {
+  MemoryBusHub hub;
+  const auto a = hub.connect(), b = hub.connect();
+  hub.setState(BusState::kDown);
+  EXPECT_FALSE(a->send(makeFrame(1)));
+  EXPECT_EQ(a->state(), BusState::kDown);
+  hub.setState(BusState::kActive);
+  EXPECT_FALSE(b->receive()) << "a frame of the past must not come late";
+  EXPECT_EQ(a->confirmed(), 0u);
+}
+
+TEST(MemoryBus, LosesAndCountsWhatAFullQueueCannotHold) {
+  MemoryBusHub hub;
+  const auto a = hub.connect(), b = hub.connect();
+  for (std::size_t i = 0; i < MemoryBusHub::kQueueLength + 3; ++i) a->send(makeFrame(1));
+  EXPECT_EQ(hub.dropped(), 3u);
+}
+
+TEST(MemoryBus, ForgetsAParticipantThatLeft) {
+  MemoryBusHub hub;
+  const auto a = hub.connect();
+  hub.connect();
+  EXPECT_TRUE(a->send(makeFrame(1)));
+}
+
+TEST(EmbeddedBus, CarriesFramesUnchangedToAllOthers) {
+  const std::string name = uniqueName("carry");
+  EmbeddedBus a(name), b(name), c(name);
+  Frame frame = makeFrame(0x1ABCDEF0 & CAN_EFF_MASK, 0x55);
+  frame.extended = true;
+  frame.length = 3;
+  frame.data = {1, 2, 3, 0, 0, 0, 0, 0};
+  EXPECT_TRUE(a.send(frame));
+  for (EmbeddedBus* bus : {&b, &c}) {
+    const auto got = bus->receive();
+    ASSERT_TRUE(got);
+    EXPECT_EQ(got->id, frame.id);
+    EXPECT_TRUE(got->extended);
+    EXPECT_EQ(got->length, 3);
+    EXPECT_EQ(got->data, frame.data);
+  }
+  EXPECT_FALSE(a.receive());
+}
+
+TEST(EmbeddedBus, CrossesProcesses) {
+  const std::string name = uniqueName("fork");
+  EmbeddedBus here(name);
+  const pid_t child = fork();
+  if (child == 0) {
+    EmbeddedBus there(name);
+    there.send(makeFrame(0x123, 7));
+    _exit(0);
+  }
+  pollfd wait{here.descriptor(), POLLIN, 0};
+  ASSERT_EQ(poll(&wait, 1, 5000), 1);
+  EXPECT_EQ(here.receive()->data[0], 7);
+  waitpid(child, nullptr, 0);
+}
+
+TEST(EmbeddedBus, TwoNamesAreTwoBuses) {
+  EmbeddedBus a(uniqueName("one")), b(uniqueName("two"));
+  a.send(makeFrame(1));
+  EXPECT_FALSE(b.receive());
+}
+
+TEST(EmbeddedBus, FullReceiverLosesFramesAndIsCounted) {
+  const std::string name = uniqueName("full");
+  EmbeddedBus a(name), lazy(name);
+  constexpr int kSent = 5000;
+  for (int i = 0; i < kSent; ++i) EXPECT_TRUE(a.send(makeFrame(1)));
+  std::uint64_t received = 0;
+  while (lazy.receive()) ++received;
+  EXPECT_GT(a.dropped(), 0u);
+  EXPECT_EQ(received + a.dropped(), static_cast<std::uint64_t>(kSent));
+}
+
+TEST(EmbeddedBus, RemovesSocketsOfDeadProcesses) {
+  const std::string name = uniqueName("stale");
+  EmbeddedBus here(name);
+  const pid_t child = fork();
+  if (child == 0) {
+    new EmbeddedBus(name);  // dies with its socket file left behind
+    _exit(0);
+  }
+  waitpid(child, nullptr, 0);
+  const auto count = [&] {
+    std::size_t files = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(here.folder())) files += entry.exists();
+    return files;
+  };
+  ASSERT_EQ(count(), 2u);
+  here.send(makeFrame(1));
+  EXPECT_EQ(count(), 1u);
+  EXPECT_EQ(here.dropped(), 0u);
+}
+
+TEST(EmbeddedBus, DiscardsDatagramsThatAreNoDataFrame) {
+  const std::string name = uniqueName("odd");
+  EmbeddedBus here(name);
+  const std::string path = std::filesystem::directory_iterator(here.folder())->path();
+  const int rogue = socket(AF_UNIX, SOCK_DGRAM, 0);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::strncpy(address.sun_path, path.c_str(), sizeof(address.sun_path) - 1);
+  const auto sendBytes = [&](const void* bytes, std::size_t count) {
+    sendto(rogue, bytes, count, 0, reinterpret_cast<const sockaddr*>(&address), sizeof(address));
+  };
+  can_frame frame{};
+  sendBytes(&frame, 15);
+  sendBytes("", 0);
+  frame.can_dlc = 9;
+  sendBytes(&frame, sizeof(frame));
+  frame.can_dlc = 8;
+  frame.can_id = CAN_RTR_FLAG | 0x110;
+  sendBytes(&frame, sizeof(frame));
+  frame.can_id = CAN_ERR_FLAG;
+  sendBytes(&frame, sizeof(frame));
+  EXPECT_FALSE(here.receive());
+  EXPECT_EQ(here.malformed(), 5u);
+  frame.can_id = 0x110;
+  sendBytes(&frame, sizeof(frame));
+  EXPECT_TRUE(here.receive());
+  close(rogue);
+}
+
+TEST(EmbeddedBus, TellsWhenItsSocketWasRemoved) {
+  EmbeddedBus here(uniqueName("removed"));
+  EXPECT_EQ(here.state(), BusState::kActive);
+  std::filesystem::remove_all(here.folder());
+  EXPECT_EQ(here.state(), BusState::kDown);
+  EXPECT_FALSE(here.send(makeFrame(1)));
+}
+
+TEST(EmbeddedBus, RefusesNamesThatCouldLeaveItsFolder) {
+  for (const char* name : {"", "a/b", "..", "a b", "123456789012345678901234567890123"}) {
+    EXPECT_THROW(EmbeddedBus bus(name), std::invalid_argument) << name;
+  }
+}
+
+}  // namespace
+}  // namespace tunnel_pilot::can
