@@ -33,7 +33,8 @@ std::uint64_t maskOf(const SignalLayout& signal) {
 }
 
 bool inRange(const SignalLayout& signal, std::int64_t raw) {
-  return raw >= std::llround(signal.min / signal.factor) && raw <= std::llround(signal.max / signal.factor);
+  return raw >= std::llround(signal.min / signal.factor) &&
+         raw <= std::llround(signal.max / signal.factor);
 }
 
 /// Takes the fields in the order of the layout and sets their bits.
@@ -72,7 +73,8 @@ class Writer {
 /// Takes the fields in the order of the layout and fills them from the bits.
 class Reader {
  public:
-  Reader(const FrameLayout& layout, std::uint64_t bits) : signal_(layout.signals.data() + 1), bits_(bits) {}
+  Reader(const FrameLayout& layout, std::uint64_t bits)
+      : signal_(layout.signals.data() + 1), bits_(bits) {}
 
   void operator()(double& value) {
     const SignalLayout& signal = *signal_;
@@ -128,7 +130,8 @@ struct Description<BridgeStatusFrame> {
   static constexpr std::uint32_t kId = kTpStatusId;
   template <class Visitor, class F>
   static void visit(Visitor& v, F& f) {
-    v(f.counter), v(f.state), v(f.reason), v(f.feedback_age), v(f.frames_rejected), v(f.commands_rejected);
+    v(f.counter), v(f.state), v(f.reason), v(f.feedback_age), v(f.frames_rejected),
+        v(f.commands_rejected);
   }
 };
 
@@ -207,7 +210,8 @@ std::optional<Frame> encode(const Fields& fields) {
   Frame frame;
   frame.id = layout.id;
   frame.length = kFrameLength;
-  for (std::size_t i = 0; i < 8; ++i) frame.data[i] = static_cast<std::uint8_t>(writer.bits() >> (8 * i));
+  for (std::size_t i = 0; i < 8; ++i)
+    frame.data[i] = static_cast<std::uint8_t>(writer.bits() >> (8 * i));
   frame.data[0] = frameCrc(layout, frame);
   return frame;
 }

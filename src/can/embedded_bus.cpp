@@ -1,17 +1,17 @@
 #include "tunnel_pilot/can/embedded_bus.h"
 
-#include <atomic>
-#include <cerrno>
-#include <cstdlib>
-#include <cstring>
-#include <stdexcept>
-
 #include <dirent.h>
 #include <linux/can.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <stdexcept>
 
 namespace tunnel_pilot::can {
 namespace {
@@ -21,7 +21,8 @@ static_assert(sizeof(can_frame) == 16, "the datagrams' layout is part of the int
 void checkName(const std::string& name) {
   const char* allowed = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-";
   if (name.empty() || name.size() > 32 || name.find_first_not_of(allowed) != std::string::npos) {
-    throw std::invalid_argument("embedded CAN bus: the name '" + name + "' must be 1 to 32 of [A-Za-z0-9_-]");
+    throw std::invalid_argument("embedded CAN bus: the name '" + name +
+                                "' must be 1 to 32 of [A-Za-z0-9_-]");
   }
 }
 
@@ -99,7 +100,8 @@ EmbeddedBus::EmbeddedBus(const std::string& name) {
   const sockaddr_un address = addressOf(path_);
   removeStaleSockets();
   socket_ = socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-  if (socket_ < 0) throw std::runtime_error(std::string("embedded CAN bus: socket: ") + std::strerror(errno));
+  if (socket_ < 0)
+    throw std::runtime_error(std::string("embedded CAN bus: socket: ") + std::strerror(errno));
   unlink(path_.c_str());  // left by a dead process that had our number
   if (bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) {
     const std::string why = std::strerror(errno);

@@ -6,8 +6,10 @@ namespace {
 // Crc and AliveCounter open every frame; the codec takes the signals behind them in this order.
 FrameLayout frame(std::uint32_t id, const char* name, std::uint8_t data_id,
                   const std::vector<SignalLayout>& payload) {
-  FrameLayout layout{id, name, data_id, {{"Crc", 0, 8, false, 1, 0, 255, ""},
-                                         {"AliveCounter", 8, 4, false, 1, 0, 14, ""}}};
+  FrameLayout layout{id,
+                     name,
+                     data_id,
+                     {{"Crc", 0, 8, false, 1, 0, 255, ""}, {"AliveCounter", 8, 4, false, 1, 0, 14, ""}}};
   layout.signals.insert(layout.signals.end(), payload.begin(), payload.end());
   return layout;
 }
@@ -92,9 +94,9 @@ FrameLayout coils2() {
 }  // namespace
 
 const std::vector<FrameLayout>& frameLayouts() {
-  static const std::vector<FrameLayout> layouts = {
-      tpCommand(),   tpCommandInfo(),  tpStatus(), truckFeedback(), truckMotion(),
-      truckStatus(), operatorInputs(), coils1(),   coils2()};
+  static const std::vector<FrameLayout> layouts = {tpCommand(),      tpCommandInfo(), tpStatus(),
+                                                   truckFeedback(),  truckMotion(),   truckStatus(),
+                                                   operatorInputs(), coils1(),        coils2()};
   return layouts;
 }
 

@@ -1,8 +1,3 @@
-#include <cstring>
-#include <filesystem>
-#include <stdexcept>
-#include <string>
-
 #include <gtest/gtest.h>
 #include <linux/can.h>
 #include <poll.h>
@@ -10,6 +5,12 @@
 #include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
+
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
 
 #include "tunnel_pilot/can/embedded_bus.h"
 #include "tunnel_pilot/can/memory_bus.h"
@@ -24,6 +25,22 @@ Frame makeFrame(std::uint32_t id, std::uint8_t first_byte = 0) {
   frame.data[0] = first_byte;
   return frame;
 }
+
+// The buses of these tests live in a folder of their own, that goes when they are done.
+class OwnRuntimeFolder : public testing::Environment {
+ public:
+  void SetUp() override {
+    char pattern[] = "/tmp/tunnel_pilot_bus_test.XXXXXX";
+    ASSERT_NE(mkdtemp(pattern), nullptr);
+    folder_ = pattern;
+    setenv("XDG_RUNTIME_DIR", pattern, 1);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+ private:
+  std::string folder_;
+};
+const auto* const kOwnRuntimeFolder = testing::AddGlobalTestEnvironment(new OwnRuntimeFolder);
 
 std::string uniqueName(const std::string& what) { return what + "_" + std::to_string(getpid()); }
 

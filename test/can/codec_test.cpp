@@ -1,5 +1,7 @@
 #include "tunnel_pilot/can/codec.h"
 
+#include <gtest/gtest.h>
+
 #include <cmath>
 #include <fstream>
 #include <functional>
@@ -8,8 +10,6 @@
 #include <sstream>
 #include <string>
 #include <vector>
-
-#include <gtest/gtest.h>
 
 namespace tunnel_pilot::can {
 namespace {
@@ -167,10 +167,10 @@ void checkVector(const Vector& vector) {
 }
 
 const std::map<std::string, std::function<void(const Vector&)>> kChecks = {
-    {"TP_COMMAND", checkVector<TruckCommandFrame>},   {"TP_COMMAND_INFO", checkVector<CommandInfoFrame>},
-    {"TP_STATUS", checkVector<BridgeStatusFrame>},    {"TRUCK_FEEDBACK", checkVector<TruckFeedbackFrame>},
-    {"TRUCK_MOTION", checkVector<TruckMotionFrame>},  {"TRUCK_STATUS", checkVector<TruckStatusFrame>},
-    {"OPERATOR", checkVector<OperatorFrame>},         {"COILS_1", checkVector<Coils1Frame>},
+    {"TP_COMMAND", checkVector<TruckCommandFrame>},  {"TP_COMMAND_INFO", checkVector<CommandInfoFrame>},
+    {"TP_STATUS", checkVector<BridgeStatusFrame>},   {"TRUCK_FEEDBACK", checkVector<TruckFeedbackFrame>},
+    {"TRUCK_MOTION", checkVector<TruckMotionFrame>}, {"TRUCK_STATUS", checkVector<TruckStatusFrame>},
+    {"OPERATOR", checkVector<OperatorFrame>},        {"COILS_1", checkVector<Coils1Frame>},
     {"COILS_2", checkVector<Coils2Frame>},
 };
 

@@ -1,12 +1,12 @@
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <map>
 #include <regex>
 #include <string>
-
-#include <gtest/gtest.h>
-#include <sys/wait.h>
 
 #include "tunnel_pilot/can/layout.h"
 
@@ -85,7 +85,8 @@ TEST(Dbc, HoldsTheSameSignalsAsTheCodec) {
 TEST(Dbc, VectorsAreWhatCantoolsMakesOfIt) {
   const char* chosen = std::getenv("TUNNEL_PILOT_CANTOOLS_PYTHON");  // a python3 that has cantools
   const std::string python = chosen != nullptr ? chosen : "python3";
-  const std::string command = python + " " + TUNNEL_PILOT_SOURCE_DIR + "/test/can/make_vectors.py --check";
+  const std::string command =
+      python + " " + TUNNEL_PILOT_SOURCE_DIR + "/test/can/make_vectors.py --check";
   const int status = std::system(command.c_str());
   ASSERT_TRUE(WIFEXITED(status));
   if (WEXITSTATUS(status) == 77) {

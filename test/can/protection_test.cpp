@@ -1,18 +1,21 @@
 #include "tunnel_pilot/can/protection.h"
 
+#include <gtest/gtest.h>
+
+#include <cstdio>
 #include <cstring>
 #include <functional>
 #include <random>
 #include <vector>
-
-#include <gtest/gtest.h>
 
 #include "tunnel_pilot/can/codec.h"
 
 namespace tunnel_pilot::can {
 namespace {
 
-void flip(Frame& frame, int bit) { frame.data[static_cast<std::size_t>(bit / 8)] ^= static_cast<std::uint8_t>(1 << (bit % 8)); }
+void flip(Frame& frame, int bit) {
+  frame.data[static_cast<std::size_t>(bit / 8)] ^= static_cast<std::uint8_t>(1 << (bit % 8));
+}
 
 struct Kind {
   Frame frame;
@@ -24,7 +27,8 @@ Kind kindOf(const Fields& fields) {
   return {*encode(fields), [](const Frame& frame) { return decode<Fields>(frame).has_value(); }};
 }
 
-// One frame of every kind, with numbers in the middle of their ranges so that no range check helps the CRC.
+// One frame of every kind, with numbers in the middle of their ranges so that no range check helps the
+// CRC.
 std::vector<Kind> allKinds() {
   TruckCommandFrame command;
   command.articulation_angle = 0.2;

@@ -9,8 +9,8 @@
 
 namespace tunnel_pilot::can {
 
-// One struct for each frame of config/tunnel_pilot.dbc, in SI units. Degrees, kPa and per cent exist only
-// inside the codec. Enumerations stay numbers here (the rooms above know their names).
+// One struct for each frame of config/tunnel_pilot.dbc, in SI units. Degrees, kPa and per cent exist
+// only inside the codec. Enumerations stay numbers here (the rooms above know their names).
 
 /// TP_COMMAND: what the truck shall do.
 struct TruckCommandFrame {
@@ -35,9 +35,9 @@ struct CommandInfoFrame {
 /// TP_STATUS: the bridge's safety state.
 struct BridgeStatusFrame {
   std::uint8_t counter = 0;
-  std::uint8_t state = 0;      ///< bridge::SafetyState
-  std::uint8_t reason = 0;     ///< supervision::Reason of the last change of state
-  double feedback_age = 0.0;   ///< [s], at most 0.255
+  std::uint8_t state = 0;     ///< bridge::SafetyState
+  std::uint8_t reason = 0;    ///< supervision::Reason of the last change of state
+  double feedback_age = 0.0;  ///< [s], at most 0.255
   std::uint16_t frames_rejected = 0;
   std::uint16_t commands_rejected = 0;
 };
@@ -103,8 +103,8 @@ struct Coils2Frame {
   std::array<double, 3> coils{};
 };
 
-/// Writes a struct as a frame, with its CRC. nullopt when a number is not finite or its nearest raw value
-/// lies outside the range of the .dbc: nothing is clamped and nothing wraps.
+/// Writes a struct as a frame, with its CRC. nullopt when a number is not finite or its nearest raw
+/// value lies outside the range of the .dbc: nothing is clamped and nothing wraps.
 template <class Fields>
 std::optional<Frame> encode(const Fields& fields);
 

@@ -12,11 +12,10 @@ namespace tunnel_pilot::can {
 /// file in the bus's folder and sends to all the others, so any language can join or listen
 /// (docs/can.md). Full queues lose frames as a controller's do, and are counted.
 ///
-/// Folder: $XDG_RUNTIME_DIR/tunnel_pilot_can/NAME, or /tmp/tunnel_pilot_can.UID/NAME, for its owner only.
-/// The kernel keeps few datagrams for a socket (net.unix.max_dgram_qlen, often 10): read at least every
-/// 20 ms, or when descriptor() polls readable.
-/// Throws std::invalid_argument for a name that is not 1 to 32 of [A-Za-z0-9_-], std::runtime_error when
-/// the folder or the socket cannot be made.
+/// Folder: $XDG_RUNTIME_DIR/tunnel_pilot_can/NAME, or /tmp/tunnel_pilot_can.UID/NAME, for its owner
+/// only. The kernel keeps few datagrams for a socket (net.unix.max_dgram_qlen, often 10): read at least
+/// every 20 ms, or when descriptor() polls readable. Throws std::invalid_argument for a name that is not
+/// 1 to 32 of [A-Za-z0-9_-], std::runtime_error when the folder or the socket cannot be made.
 class EmbeddedBus : public Bus {
  public:
   explicit EmbeddedBus(const std::string& name);

@@ -10,8 +10,8 @@ namespace tunnel_pilot::can {
 /// All signals are little-endian (Intel) and have no offset.
 struct SignalLayout {
   const char* name;
-  int start;         ///< lowest bit, byte * 8 + bit [1]
-  int length;        ///< [bit]
+  int start;   ///< lowest bit, byte * 8 + bit [1]
+  int length;  ///< [bit]
   bool is_signed;
   double factor;     ///< physical value in `unit` of one raw step
   double min;        ///< [unit]

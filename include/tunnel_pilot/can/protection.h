@@ -17,9 +17,9 @@ constexpr std::uint8_t nextCounter(std::uint8_t counter) {
   return static_cast<std::uint8_t>((counter + 1) % kCounterModulus);
 }
 
-/// Judges the stream of frames of one identifier. A frame's counter must be one or two ahead of the frame
-/// before (one lost frame is forgiven). The last ten receptions are kept: while three or more of them were
-/// wrong (CRC, length or counter), the stream is faulty.
+/// Judges the stream of frames of one identifier. A frame's counter must be one or two ahead of the
+/// frame before (one lost frame is forgiven). The last ten receptions are kept: while three or more of
+/// them were wrong (CRC, length or counter), the stream is faulty.
 class StreamCheck {
  public:
   /// Takes the counter of a frame whose CRC is right. False: the frame is to be discarded. After a wrong
