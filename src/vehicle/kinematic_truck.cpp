@@ -23,6 +23,7 @@ void KinematicTruck::reset(const geometry::Pose& pose, double articulation, doub
 }
 
 void KinematicTruck::step(const PlantInput& input, const PlantSurroundings& surroundings, double dt) {
+  checkStep(input, surroundings, dt);
   const double demand =
       std::clamp(input.steering, -geometry_.max_articulation, geometry_.max_articulation);
   const double rate = std::clamp((demand - state_.articulation) / dt, -max_rate_, max_rate_);

@@ -1,7 +1,10 @@
 #include "tunnel_pilot/vehicle/truck_parameters.h"
 
 #include <cmath>
+#include <stdexcept>
 #include <utility>
+
+#include "tunnel_pilot/vehicle/hinge_compliance.h"
 
 namespace tunnel_pilot::vehicle {
 namespace {
@@ -81,12 +84,13 @@ DriveAndBrakes loadDrive(config::Node node) {
   return d;
 }
 
+// The ranges keep every mode of the axle well inside what a 1 ms step can integrate.
 AxleSuspension loadSuspension(config::Node node) {
   AxleSuspension a{};
-  a.unsprung_mass = node.number("unsprung_mass", "kg", 100.0, 5e4);
-  a.stiffness = node.number("stiffness", "N/m", 1e5, 1e8);
-  a.damping = node.number("damping", "N s/m", 1e3, 1e6);
-  a.tyre_stiffness = node.number("tyre_stiffness", "N/m", 1e5, 1e8);
+  a.unsprung_mass = node.number("unsprung_mass", "kg", 500.0, 5e4);
+  a.stiffness = node.number("stiffness", "N/m", 1e5, 3e7);
+  a.damping = node.number("damping", "N s/m", 1e3, 3e5);
+  a.tyre_stiffness = node.number("tyre_stiffness", "N/m", 1e5, 3e7);
   node.finish();
   return a;
 }
@@ -102,6 +106,14 @@ void checkBalance(const config::Node& node, const TruckParameters& truck, Load l
   if (axles.rear < truck.rear_suspension.unsprung_mass * kGravity) {
     node.refuse(key,
                 "leaves less than the unsprung mass on the rear axle: masses or CG offsets are wrong");
+  }
+}
+
+void checkCompliance(const config::Node& node, const TruckParameters& truck) {
+  try {
+    hingeCompliance(truck);
+  } catch (const std::invalid_argument& e) {
+    node.refuse("steering", std::string("cannot be: ") + e.what());
   }
 }
 
@@ -133,6 +145,7 @@ TruckParameters loadTruck(config::Node node) {
   node.finish();
   checkBalance(node, truck, Load::kEmpty);
   checkBalance(node, truck, Load::kLoaded);
+  checkCompliance(node, truck);
   return truck;
 }
 

@@ -24,7 +24,7 @@ struct PlantState {
   double speed = 0.0;                 ///< along the front body at the reference point [m/s]
   double lateral_speed = 0.0;         ///< leftwards at the reference point [m/s] (slip)
   double yaw_rate = 0.0;              ///< of the front body [rad/s]
-  double acceleration = 0.0;          ///< longitudinal [m/s^2]
+  double acceleration = 0.0;          ///< longitudinal, at the reference point [m/s^2]
   double lateral_acceleration = 0.0;  ///< at the reference point [m/s^2]
   double pitch = 0.0;                 ///< of the front body from the road, nose down positive [rad]
 };
@@ -37,10 +37,14 @@ class Plant {
   /// Puts the vehicle at rest in all inner states but those given.
   virtual void reset(const geometry::Pose& pose, double articulation, double speed) = 0;
 
-  /// Advances by `dt` [s], 0 < dt <= 0.01, under `input` held constant.
+  /// Advances by `dt` [s], 0 < dt <= 0.01, under `input` held constant. Throws std::invalid_argument for
+  /// another `dt` and for numbers that are not finite, before anything has changed.
   virtual void step(const PlantInput& input, const PlantSurroundings& surroundings, double dt) = 0;
 
   virtual const PlantState& state() const = 0;
 };
+
+/// The check that step() begins with, shared by all plants.
+void checkStep(const PlantInput& input, const PlantSurroundings& surroundings, double dt);
 
 }  // namespace tunnel_pilot::vehicle
