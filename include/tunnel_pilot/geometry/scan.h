@@ -19,6 +19,9 @@ struct Scan {
   double range_min = 0.0;        ///< [m]
   double range_max = 0.0;        ///< [m]
   std::vector<float> ranges;     ///< [m]
+  /// Angle of the last beam as the sensor announced it [rad], to check the number of ranges against;
+  /// NaN: not announced.
+  double announced_angle_max = std::numeric_limits<double>::quiet_NaN();
 
   double angle(std::size_t i) const {
     return angle_min + static_cast<double>(i) * angle_increment;

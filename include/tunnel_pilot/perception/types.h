@@ -18,8 +18,11 @@ struct Wall {
   double residual = 0.0;                ///< RMS distance of the inliers to the curve [m]
 };
 
+/// Where both walls were found, their curves pair up: left.curve[i] and right.curve[i] lie across from each
+/// other, on one normal of the centerline; one may be longer than the other.
 struct Walls {
   Stamp stamp{};
+  bool enough_returns = false;  ///< there were points enough to look for walls
   Wall left;
   Wall right;
 };

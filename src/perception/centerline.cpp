@@ -1,0 +1,357 @@
+#include "tunnel_pilot/perception/centerline.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Dense>
+
+namespace tunnel_pilot::perception {
+namespace {
+
+using geometry::PathPoint;
+using geometry::Point;
+using geometry::Pose;
+
+bool isFinite(const Pose& pose) {
+  return std::isfinite(pose.x) && std::isfinite(pose.y) && std::isfinite(pose.heading);
+}
+
+// Unit tangent of a polyline at sample i, by central differences.
+Point tangentAt(const std::vector<Point>& curve, std::size_t i) {
+  const std::size_t before = i > 0 ? i - 1 : 0;
+  const std::size_t after = std::min(i + 1, curve.size() - 1);
+  return (curve[after] - curve[before]).normalized();
+}
+
+Point leftOf(const Point& direction) { return {-direction.y(), direction.x()}; }
+
+double cross(const Point& a, const Point& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+// Parabola y = a + b x + c x^2 fitted to points.
+struct Parabola {
+  Eigen::Vector3d coefficients = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();  // A'A
+
+  void solve(const Eigen::Vector3d& right_side) { coefficients = normal.inverse() * right_side; }
+};
+
+template <typename Nodes>
+Parabola fitParabola(const Nodes& nodes, std::size_t first, std::size_t last, const Point& origin,
+                     const Point& direction) {
+  Parabola fit;
+  double m1 = 0.0;
+  double m2 = 0.0;
+  double m3 = 0.0;
+  double m4 = 0.0;
+  Eigen::Vector3d right_side = Eigen::Vector3d::Zero();
+  for (std::size_t i = first; i <= last; ++i) {
+    const Point d = nodes[i].position - origin;
+    const double x = d.dot(direction);
+    const double y = cross(direction, d);
+    const double xx = x * x;
+    m1 += x;
+    m2 += xx;
+    m3 += xx * x;
+    m4 += xx * xx;
+    right_side += Eigen::Vector3d(y, x * y, xx * y);
+  }
+  const auto count = static_cast<double>(last - first + 1);
+  fit.normal << count, m1, m2, m1, m2, m3, m2, m3, m4;
+  fit.solve(right_side);
+  return fit;
+}
+
+}  // namespace
+
+CenterlineParameters loadCenterline(config::Node node) {
+  CenterlineParameters p;
+  p.width_min = node.number("width_min", "m", 0.5, 20.0);
+  p.width_max = node.number("width_max", "m", 0.5, 20.0);
+  if (p.width_max <= p.width_min) node.refuse("width_max", "must exceed width_min");
+  p.length_min = node.number("length_min", "m", 1.0, 20.0);
+  p.residual_max = node.number("residual_max", "m", 0.01, 1.0);
+  p.pair_length_min = node.number("pair_length_min", "m", 0.5, 20.0);
+  p.single_distance_max = node.number("single_distance_max", "m", 0.0, 50.0);
+  p.single_time_max = node.number("single_time_max", "s", 0.0, 60.0);
+  p.width_jump_max = node.number("width_jump_max", "m", 0.05, 10.0);
+  p.jump_scans = static_cast<int>(node.integer("jump_scans", "1", 1, 1000));
+  p.memory_weight_max = node.number("memory_weight_max", "1", 0.0, 1000.0);
+  p.memory_behind = node.number("memory_behind", "m", 0.0, 20.0);
+  p.memory_error_max = node.number("memory_error_max", "m", 0.01, 5.0);
+  p.far_distance = node.number("far_distance", "m", 0.5, 50.0);
+  p.fit_reach = node.number("fit_reach", "m", 0.5, 10.0);
+  p.wall_deviation = node.number("wall_deviation", "m", 0.001, 1.0);
+  p.wall_correlation = node.number("wall_correlation", "m", 0.01, 20.0);
+  node.finish();
+  return p;
+}
+
+CenterlineEstimator::CenterlineEstimator(const CenterlineParameters& parameters)
+    : parameters_(parameters) {}
+
+void CenterlineEstimator::reset() {
+  tunnel_ = Tunnel();
+  memory_.clear();
+  last_width_.reset();
+  last_pose_.reset();
+  paired_stamp_.reset();
+  single_distance_ = 0.0;
+  jumps_ = 0;
+}
+
+const Tunnel& CenterlineEstimator::refuse(TunnelReason reason) {
+  const Stamp stamp = tunnel_.state.stamp;
+  tunnel_.state = TunnelState();
+  tunnel_.state.stamp = stamp;
+  tunnel_.state.reason = reason;
+  tunnel_.centerline = geometry::Path();
+  return tunnel_;
+}
+
+const Tunnel& CenterlineEstimator::update(const Walls& walls, const std::optional<Pose>& odom_pose) {
+  tunnel_.state.stamp = walls.stamp;
+  const std::optional<Pose> pose = odom_pose && isFinite(*odom_pose) ? odom_pose : std::nullopt;
+  TunnelReason reason = measure(walls);
+  travel(walls, pose);
+  if (reason == TunnelReason::kNone && !paired_now_) reason = checkSingle(walls, pose.has_value());
+  if (reason == TunnelReason::kNone) reason = checkWidth(pose);
+  if (reason != TunnelReason::kNone) return refuse(reason);
+  if (pose) {
+    remember(*pose);
+  } else {
+    memory_.clear();
+    nodes_ = measured_;
+  }
+  fitPath();
+  if (path_.back().s - path_.front().s < parameters_.length_min) return refuse(TunnelReason::kPoorFit);
+  fillState(walls);
+  return tunnel_;
+}
+
+// Centerline nodes of this scan, in base_link.
+TunnelReason CenterlineEstimator::measure(const Walls& walls) {
+  measured_.clear();
+  paired_now_ = false;
+  if (!walls.left.found && !walls.right.found) {
+    return walls.enough_returns ? TunnelReason::kNoWalls : TunnelReason::kTooFewPoints;
+  }
+  const double residual = std::max(walls.left.residual, walls.right.residual);
+  if (!(residual <= parameters_.residual_max)) return TunnelReason::kPoorFit;
+  const std::vector<Point>& left = walls.left.curve;
+  const std::vector<Point>& right = walls.right.curve;
+  const std::size_t pairs = std::min(left.size(), right.size());
+  double length = 0.0;
+  for (std::size_t i = 0; i < pairs; ++i) {
+    measured_.push_back({0.5 * (left[i] + right[i]), (left[i] - right[i]).norm(), 0.0});
+    if (i > 0) length += (measured_[i].position - measured_[i - 1].position).norm();
+  }
+  paired_now_ = length >= parameters_.pair_length_min;
+  if (!paired_now_) measured_.clear();
+  if (!paired_now_ && !last_width_) return TunnelReason::kNeverPaired;
+  const bool left_longer = left.size() > right.size();
+  followWall(left_longer ? left : right, left_longer ? 1.0 : -1.0);
+  return measured_.size() < 3 ? TunnelReason::kPoorFit : TunnelReason::kNone;
+}
+
+// Continues the measured nodes along one wall, at the last width.
+void CenterlineEstimator::followWall(const std::vector<Point>& curve, double side) {
+  const double width = measured_.empty() ? *last_width_ : measured_.back().width;
+  for (std::size_t i = measured_.size(); i < curve.size(); ++i) {
+    const Point normal = leftOf(tangentAt(curve, i));
+    measured_.push_back({curve[i] - 0.5 * side * width * normal, width, 0.0});
+  }
+}
+
+void CenterlineEstimator::travel(const Walls& walls, const std::optional<Pose>& pose) {
+  if (pose && last_pose_) single_distance_ += (pose->position() - last_pose_->position()).norm();
+  last_pose_ = pose;
+  if (!paired_now_) return;
+  single_distance_ = 0.0;
+  paired_stamp_ = walls.stamp;
+}
+
+TunnelReason CenterlineEstimator::checkSingle(const Walls& walls, bool has_odometry) const {
+  const bool too_long = has_odometry
+                            ? single_distance_ > parameters_.single_distance_max
+                            : !paired_stamp_ || toSeconds(walls.stamp - *paired_stamp_) >
+                                                    parameters_.single_time_max;
+  return too_long ? TunnelReason::kSingleTooLong : TunnelReason::kNone;
+}
+
+// The width beside the truck must be a tunnel's, and what was expected of it: what earlier scans saw
+// there, or, without odometry, the last one.
+TunnelReason CenterlineEstimator::checkWidth(const std::optional<Pose>& pose) {
+  const double width = measured_.front().width;
+  if (!(width >= parameters_.width_min && width <= parameters_.width_max)) {
+    return TunnelReason::kWidthImplausible;
+  }
+  double expected = last_width_.value_or(width);
+  if (pose && !memory_.empty()) {
+    const Point place = pose->transform(measured_.front().position);
+    const auto nearest = std::min_element(memory_.begin(), memory_.end(), [&](const Node& a, const Node& b) {
+      return (a.position - place).squaredNorm() < (b.position - place).squaredNorm();
+    });
+    expected = nearest->width;
+  }
+  if (std::abs(width - expected) > parameters_.width_jump_max && ++jumps_ < parameters_.jump_scans) {
+    return TunnelReason::kWidthJump;
+  }
+  if (jumps_ >= parameters_.jump_scans) memory_.clear();
+  jumps_ = 0;
+  if (paired_now_) last_width_ = width;
+  return TunnelReason::kNone;
+}
+
+// Merges this scan's nodes into those kept in the odom frame, and reads them back.
+void CenterlineEstimator::remember(const Pose& pose) {
+  for (Node& node : measured_) {
+    const double ratio = node.position.norm() / parameters_.far_distance;
+    node.weight = 1.0 / (1.0 + ratio * ratio);
+    node.position = pose.transform(node.position);
+  }
+  if (!fuse()) memory_.clear();
+  appendMeasured();
+  forgetBehind(pose);
+  nodes_ = memory_;
+  for (Node& node : nodes_) node.position = pose.inverseTransform(node.position);
+}
+
+// Moves each remembered node towards the measured centerline. False when they do not fit together.
+bool CenterlineEstimator::fuse() {
+  double error = 0.0;
+  int compared = 0;
+  std::size_t j = 0;
+  std::size_t kept = 0;
+  for (; kept < memory_.size(); ++kept) {
+    Node& node = memory_[kept];
+    double t = 0.0;
+    while (true) {
+      const Point chord = measured_[j + 1].position - measured_[j].position;
+      t = (node.position - measured_[j].position).dot(chord) / chord.squaredNorm();
+      if (t <= 1.0 || j + 2 >= measured_.size()) break;
+      ++j;
+    }
+    if (t > 1.0) break;  // beyond what is seen now
+    if (t < 0.0 && j == 0) continue;  // behind what is seen now
+    const Node& a = measured_[j];
+    const Node& b = measured_[j + 1];
+    const double along = std::clamp(t, 0.0, 1.0);
+    const Point step = a.position + along * (b.position - a.position) - node.position;
+    error += step.norm();
+    ++compared;
+    const double gain = a.weight / (node.weight + a.weight);
+    node.position += gain * step;
+    node.width += gain * (a.width + along * (b.width - a.width) - node.width);
+    node.weight = std::min(node.weight + a.weight, parameters_.memory_weight_max);
+  }
+  memory_.resize(kept);
+  return compared > 0 && error <= parameters_.memory_error_max * compared;
+}
+
+void CenterlineEstimator::appendMeasured() {
+  constexpr double kNearest = 0.25;  // [m] between nodes
+  for (std::size_t i = 0; i < measured_.size(); ++i) {
+    if (memory_.size() >= 2) {
+      const Point& last = memory_.back().position;
+      const Point direction = (last - memory_[memory_.size() - 2].position).normalized();
+      if (direction.dot(measured_[i].position - last) < kNearest) continue;
+    }
+    memory_.push_back(measured_[i]);
+  }
+}
+
+void CenterlineEstimator::forgetBehind(const Pose& pose) {
+  std::size_t first = 0;
+  while (first + 3 < memory_.size()) {
+    const Node& next = memory_[first + 1];
+    const Point direction = (memory_[first + 2].position - next.position).normalized();
+    if (direction.dot(pose.position() - next.position) < parameters_.memory_behind) break;
+    ++first;
+  }
+  memory_.erase(memory_.begin(), memory_.begin() + static_cast<std::ptrdiff_t>(first));
+}
+
+// Path samples of the nodes, each with the parabola's heading and curvature.
+void CenterlineEstimator::fitPath() {
+  path_.clear();
+  std::size_t first = 0;
+  std::size_t last = 0;
+  const double reach = parameters_.fit_reach;
+  const std::size_t end = nodes_.size() - 1;
+  for (std::size_t i = 0; i <= end; ++i) {
+    const auto distance = [&](std::size_t k) { return (nodes_[k].position - nodes_[i].position).norm(); };
+    while (last < end && distance(last) < reach) ++last;
+    while (first < i && distance(first) > reach) ++first;
+    // At the ends the window is the whole first or last stretch.
+    std::size_t from = first;
+    std::size_t to = last;
+    while (to < end && (nodes_[to].position - nodes_[from].position).norm() < 2.0 * reach) ++to;
+    while (from > 0 && (nodes_[to].position - nodes_[from].position).norm() < 2.0 * reach) --from;
+    const Point direction = (nodes_[to].position - nodes_[from].position).normalized();
+    const Parabola fit = fitParabola(nodes_, from, to, nodes_[i].position, direction);
+    const double a = fit.coefficients(0);
+    const double b = fit.coefficients(1);
+    const Point place = nodes_[i].position + a * leftOf(direction);
+    const double heading = std::atan2(direction.y(), direction.x()) + std::atan(b);
+    const double s =
+        path_.empty() ? 0.0 : path_.back().s + std::hypot(place.x() - path_.back().x, place.y() - path_.back().y);
+    path_.push_back({s, place.x(), place.y(), heading,
+                     2.0 * fit.coefficients(2) / std::pow(1.0 + b * b, 1.5)});
+  }
+  prolongBackwards();
+}
+
+// Back to beside the reference point, at the first sample's curvature.
+void CenterlineEstimator::prolongBackwards() {
+  constexpr double kStep = 0.5;
+  constexpr double kBehind = 0.5;  // [m]
+  std::vector<PathPoint> added;
+  PathPoint p = path_.front();
+  while (p.x * std::cos(p.heading) + p.y * std::sin(p.heading) > -kBehind && added.size() < 40) {
+    const double mean_heading = p.heading - 0.5 * kStep * p.curvature;
+    p.x -= kStep * std::cos(mean_heading);
+    p.y -= kStep * std::sin(mean_heading);
+    p.heading -= kStep * p.curvature;
+    p.s -= kStep;
+    added.push_back(p);
+  }
+  path_.insert(path_.begin(), added.rbegin(), added.rend());
+}
+
+void CenterlineEstimator::fillState(const Walls& walls) {
+  tunnel_.centerline = geometry::Path(path_);
+  const geometry::PathProjection foot = tunnel_.centerline.project(Point::Zero());
+  TunnelState& state = tunnel_.state;
+  state.valid = true;
+  state.reason = TunnelReason::kNone;
+  state.lateral_offset = foot.lateral_offset;
+  state.heading_error = geometry::wrapAngle(-foot.heading);
+  state.curvature = foot.curvature;
+  // Nodes nearest to the reference point: their mean spacing apart, from `first` to `last`.
+  const auto nearest = std::min_element(nodes_.begin(), nodes_.end(), [](const Node& a, const Node& b) {
+    return a.position.squaredNorm() < b.position.squaredNorm();
+  });
+  state.width = nearest->width;
+  const auto at = static_cast<std::size_t>(std::distance(nodes_.begin(), nearest));
+  std::size_t first = at;
+  std::size_t last = at;
+  const double span = 2.0 * parameters_.fit_reach;
+  while (first > 0 && nodes_[first - 1].position.norm() < parameters_.fit_reach) --first;
+  while (last + 1 < nodes_.size() && (nodes_[last].position - nodes_[first].position).norm() < span) ++last;
+  const Point direction(std::cos(foot.heading), std::sin(foot.heading));
+  const Point origin = -foot.lateral_offset * leftOf(direction);
+  const Parabola fit = fitParabola(nodes_, first, last, origin, direction);
+  const double spacing = (nodes_[last].position - nodes_[first].position).norm() / static_cast<double>(last - first);
+  const double residual = std::max({walls.left.residual, walls.right.residual, parameters_.wall_deviation});
+  const double dependent = std::max(1.0, 2.0 * parameters_.wall_correlation / spacing);
+  const double variance = residual * residual * dependent * (paired_now_ ? 0.5 : 1.0);
+  const Eigen::Matrix3d c = variance * fit.normal.inverse();
+  // (offset, heading error, curvature) = (-a, -b, 2 c); the width is the mean of as many pairs.
+  const double w = 4.0 * variance / static_cast<double>(last - first + 1);
+  state.covariance = {c(0, 0),        c(0, 1),        -2.0 * c(0, 2), 0.0,  //
+                      c(1, 0),        c(1, 1),        -2.0 * c(1, 2), 0.0,  //
+                      -2.0 * c(2, 0), -2.0 * c(2, 1), 4.0 * c(2, 2),  0.0,  //
+                      0.0,            0.0,            0.0,            w};
+}
+
+}  // namespace tunnel_pilot::perception

@@ -1,0 +1,94 @@
+#include "corridor_seed.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tunnel_pilot::perception {
+namespace {
+
+constexpr float kSpacingInSeed = 0.3F;  // [m] groups nearer than this vote once
+constexpr int kHeadings = 13;
+constexpr int kCurvatures = 7;
+constexpr float kInsidePenalty = 0.5F;  // of a vote, for each return between the walls
+constexpr float kFewestVotes = 4.0F;    // for a heap to be a wall
+
+float gridValue(int i, int count, double largest) {
+  return static_cast<float>(largest) * (2.0F * static_cast<float>(i) / static_cast<float>(count - 1) - 1.0F);
+}
+
+}  // namespace
+
+CorridorSeeder::CorridorSeeder(const WallSegmentationParameters& parameters)
+    : parameters_(parameters), bin_(static_cast<float>(parameters.width_max / kBins)) {}
+
+void CorridorSeeder::gatherNear(const std::vector<PointGroup>& groups) {
+  x_.clear();
+  y_.clear();
+  const auto radius = static_cast<float>(parameters_.seed_radius);
+  for (const PointGroup& g : groups) {
+    if (g.x * g.x + g.y * g.y > radius * radius) continue;
+    if (!x_.empty() && std::hypot(g.x - x_.back(), g.y - y_.back()) < kSpacingInSeed) continue;
+    x_.push_back(g.x);
+    y_.push_back(g.y);
+  }
+}
+
+void CorridorSeeder::vote(float heading, float curvature) {
+  std::fill(std::begin(left_), std::end(left_), 0.0F);
+  std::fill(std::begin(right_), std::end(right_), 0.0F);
+  const float c = std::cos(heading);
+  const float s = std::sin(heading);
+  const float per_bin = 1.0F / bin_;
+  for (std::size_t i = 0; i < x_.size(); ++i) {
+    const float u = c * x_[i] + s * y_[i];
+    const float v = c * y_[i] - s * x_[i];
+    const float f = v - 0.5F * curvature * (u * u + v * v);
+    const float d = 2.0F * f / (1.0F + std::sqrt(std::max(0.0F, 1.0F - 2.0F * curvature * f)));
+    const int bin = static_cast<int>(std::min(std::abs(d) * per_bin, static_cast<float>(kBins)));
+    if (bin < kBins) (d > 0.0F ? left_ : right_)[bin + 1] += 1.0F;
+  }
+}
+
+CorridorSeeder::Heap CorridorSeeder::highestHeap(const float* votes) const {
+  Heap best;
+  float inside = 0.0F;
+  for (int b = 1; b <= kBins; ++b) {
+    const float heap = 0.5F * votes[b - 1] + votes[b] + 0.5F * votes[b + 1] - kInsidePenalty * inside;
+    if (heap > best.votes) best = {b, heap};
+    inside += votes[b - 1];
+  }
+  return best;
+}
+
+double CorridorSeeder::offsetOf(const Heap& heap, double side) const {
+  const float* votes = side > 0.0 ? left_ : right_;
+  const float around[3] = {0.5F * votes[heap.bin - 1], votes[heap.bin], 0.5F * votes[heap.bin + 1]};
+  const float shift = (around[2] - around[0]) / (around[0] + around[1] + around[2]);
+  return side * static_cast<double>(bin_ * (static_cast<float>(heap.bin) - 0.5F + shift));
+}
+
+std::optional<CorridorSeed> CorridorSeeder::find(const std::vector<PointGroup>& groups) {
+  gatherNear(groups);
+  float best_votes = kFewestVotes;
+  std::optional<CorridorSeed> best;
+  for (int i = 0; i < kHeadings; ++i) {
+    const float heading = gridValue(i, kHeadings, parameters_.seed_heading_max);
+    for (int j = 0; j < kCurvatures; ++j) {
+      const float curvature = gridValue(j, kCurvatures, parameters_.seed_curvature_max);
+      vote(heading, curvature);
+      const Heap left = highestHeap(left_);
+      const Heap right = highestHeap(right_);
+      // A straight guess wins a tie.
+      const float votes = left.votes + right.votes - 2.0F * std::abs(heading) - 10.0F * std::abs(curvature);
+      if (votes <= best_votes) continue;
+      best_votes = votes;
+      best = CorridorSeed{heading, curvature, std::nullopt, std::nullopt};
+      if (left.votes >= kFewestVotes) best->left = offsetOf(left, 1.0);
+      if (right.votes >= kFewestVotes) best->right = offsetOf(right, -1.0);
+    }
+  }
+  if (best && !best->left && !best->right) return std::nullopt;
+  return best;
+}
+
+}  // namespace tunnel_pilot::perception

@@ -1,0 +1,111 @@
+#include "corridor_smoother.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/LU>
+
+namespace tunnel_pilot::perception {
+namespace {
+
+// The node `length` farther along its own arc.
+CorridorNode move(const CorridorNode& from, double length) {
+  const double mean_heading = from.pose.heading + 0.5 * length * from.curvature;
+  CorridorNode to = from;
+  to.pose.x += length * std::cos(mean_heading);
+  to.pose.y += length * std::sin(mean_heading);
+  to.pose.heading += length * from.curvature;
+  return to;
+}
+
+// P <- F P F' with F = [1 l l^2/2 0; 0 1 l 0; 0 0 1 0; 0 0 0 1], the transition over length l.
+CorridorSmoother::Matrix transition(double l) {
+  CorridorSmoother::Matrix f = CorridorSmoother::Matrix::Identity();
+  f(0, 1) = f(1, 2) = l;
+  f(0, 2) = 0.5 * l * l;
+  return f;
+}
+
+}  // namespace
+
+void CorridorSmoother::start(const CorridorNode& node, const Vector& deviations) {
+  steps_.clear();
+  Step step;
+  step.node = step.predicted = node;
+  step.covariance = step.predicted_covariance = deviations.cwiseAbs2().asDiagonal();
+  step.length = 0.0;
+  steps_.push_back(step);
+}
+
+void CorridorSmoother::advance(double length) {
+  const Step& from = steps_.back();
+  const Matrix f = transition(length);
+  Step to;
+  to.length = length;
+  to.predicted = move(from.node, length);
+  to.predicted_covariance = f * from.covariance * f.transpose();
+  // White noise of curvature's rate, integrated over the step (e, psi, kappa).
+  const double l = length;
+  const double q = curvature_noise_;
+  Matrix& p = to.predicted_covariance;
+  p(0, 0) += q * l * l * l * l * l / 20.0;
+  p(0, 1) += q * l * l * l * l / 8.0;
+  p(0, 2) += q * l * l * l / 6.0;
+  p(1, 1) += q * l * l * l / 3.0;
+  p(1, 2) += q * l * l / 2.0;
+  p(2, 2) += q * l;
+  p(1, 0) = p(0, 1);
+  p(2, 0) = p(0, 2);
+  p(2, 1) = p(1, 2);
+  p(3, 3) += width_noise_ * l;
+  to.node = to.predicted;
+  to.covariance = p;
+  steps_.push_back(to);
+}
+
+double CorridorSmoother::expectedVariance(double side) const {
+  const Matrix& p = steps_.back().covariance;
+  return p(0, 0) + 2.0 * side * p(0, 3) + p(3, 3);
+}
+
+// The wall is an offset curve of the centerline: y(x) = e + side h + psi x + kappa_w x^2 / 2 with the
+// wall's own curvature kappa_w = kappa / (1 - side h kappa), near to kappa for the Jacobian's sake.
+void CorridorSmoother::measure(double side, const Slice& slice, double variance) {
+  Step& step = steps_.back();
+  const CorridorNode& node = step.node;
+  const double bend = node.curvature / std::max(0.2, 1.0 - side * node.half_width * node.curvature);
+  const double innovation = slice.lateral - side * node.half_width - 0.5 * slice.along_squared * bend;
+  const Vector jacobian(1.0, slice.along, 0.5 * slice.along_squared, side);
+  const Vector ph = step.covariance * jacobian;
+  const Vector gain = ph / (jacobian.dot(ph) + variance);
+  step.covariance.noalias() -= gain * ph.transpose();
+  fold(gain * innovation, step.node);
+}
+
+void CorridorSmoother::fold(const Vector& error, CorridorNode& node) {
+  node.pose.x -= error(0) * std::sin(node.pose.heading);
+  node.pose.y += error(0) * std::cos(node.pose.heading);
+  node.pose.heading += error(1);
+  node.curvature += error(2);
+  node.half_width += error(3);
+}
+
+void CorridorSmoother::smooth() {
+  for (std::size_t i = steps_.size() - 1; i-- > 0;) {
+    Step& step = steps_[i];
+    const Step& next = steps_[i + 1];
+    const Matrix f = transition(next.length);
+    const Matrix gain = step.covariance * f.transpose() * next.predicted_covariance.inverse();
+    const geometry::Pose& expected = next.predicted.pose;
+    const double dx = next.node.pose.x - expected.x;
+    const double dy = next.node.pose.y - expected.y;
+    const Vector correction(dy * std::cos(expected.heading) - dx * std::sin(expected.heading),
+                            next.node.pose.heading - expected.heading,
+                            next.node.curvature - next.predicted.curvature,
+                            next.node.half_width - next.predicted.half_width);
+    fold(gain * correction, step.node);
+    step.covariance += gain * (next.covariance - next.predicted_covariance) * gain.transpose();
+  }
+}
+
+}  // namespace tunnel_pilot::perception

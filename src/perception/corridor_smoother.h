@@ -1,0 +1,69 @@
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "tunnel_pilot/geometry/pose.h"
+
+namespace tunnel_pilot::perception {
+
+/// The tunnel at one place along it.
+struct CorridorNode {
+  geometry::Pose pose;      ///< of the centerline, heading along it
+  double curvature = 0.0;   ///< [1/m]
+  double half_width = 0.0;  ///< [m]
+};
+
+/// Extended Kalman filter along a tunnel with a Rauch-Tung-Striebel smoother. The error state of a node is
+/// (lateral offset e, heading psi, curvature kappa, half width h) in the node's own frame; a measurement
+/// folds it into the node at once, so that it starts from zero again.
+class CorridorSmoother {
+ public:
+  using Vector = Eigen::Matrix<double, 4, 1>;
+  using Matrix = Eigen::Matrix<double, 4, 4>;
+
+  /// `curvature_noise` [1/m^2 per m], `width_noise` [m^2 per m]: what the variances grow by.
+  CorridorSmoother(double curvature_noise, double width_noise)
+      : curvature_noise_(curvature_noise), width_noise_(width_noise) {}
+
+  void start(const CorridorNode& node, const Vector& deviations);
+  /// Appends the node `length` [m] farther on.
+  void advance(double length);
+  /// A wall's mean place in a slice across the tunnel, in the node's frame.
+  struct Slice {
+    double along = 0.0;          ///< mean of x [m]
+    double along_squared = 0.0;  ///< mean of x^2 [m^2]
+    double lateral = 0.0;        ///< mean of y [m]
+  };
+  /// Measures a wall of the last node; `side` +1 left, -1 right.
+  void measure(double side, const Slice& slice, double variance);
+  /// Variance with which the wall of the last node is expected [m^2].
+  double expectedVariance(double side) const;
+  /// Runs back over all nodes; afterwards node(i) is the smoothed one.
+  void smooth();
+
+  std::size_t size() const { return steps_.size(); }
+  const CorridorNode& node(std::size_t i) const { return steps_[i].node; }
+  const CorridorNode& last() const { return steps_.back().node; }
+  const Matrix& covariance(std::size_t i) const { return steps_[i].covariance; }
+  void truncate(std::size_t count) { steps_.resize(count); }
+
+ private:
+  struct Step {
+    CorridorNode node;          // filtered, later smoothed
+    Matrix covariance;
+    CorridorNode predicted;     // before this node's measurements
+    Matrix predicted_covariance;
+    double length;              // from the node before [m]
+    EIGEN_MAKE_ALIGNED_OPERATOR_NEW
+  };
+
+  static void fold(const Vector& error, CorridorNode& node);
+
+  double curvature_noise_;
+  double width_noise_;
+  std::vector<Step, Eigen::aligned_allocator<Step>> steps_;
+};
+
+}  // namespace tunnel_pilot::perception
