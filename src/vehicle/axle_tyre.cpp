@@ -9,7 +9,7 @@ namespace {
 constexpr double kTractionShare = 0.95;     // of mu F_z that drive and brakes may use [1]
 constexpr double kAlongDampingRatio = 0.7;  // of an axle's mass on the wound-up spring [1]
 constexpr double kAcrossDampingRatio = 0.5;
-constexpr double kSlow = 0.5;  // lateral damping fades out up to here [m/s]
+constexpr double kSlow = 0.5;  // damping fades out up to here [m/s]
 
 }  // namespace
 
@@ -45,8 +45,11 @@ double AxleTyre::resist(double speed, double limit, double dt) {
   const double sliding = limit / stiffness;
   const double after = (before + speed * dt) / (1.0 + std::abs(speed) * dt / sliding);
   along_deflection_ = std::clamp(after, -sliding, sliding);
+  const double elastic = -stiffness * along_deflection_;
+  if (std::abs(speed) >= kSlow) return elastic;
   const double rate = (along_deflection_ - before) / dt;
-  return std::clamp(-stiffness * along_deflection_ - along_damping_ * rate, -limit, limit);
+  const double damping = along_damping_ * (1.0 - std::abs(speed) / kSlow);
+  return std::clamp(elastic - damping * rate, -limit, limit);
 }
 
 double AxleTyre::corner(double along_speed, double across_speed, double load, double dt) {

@@ -6,7 +6,9 @@
 namespace tunnel_pilot::vehicle {
 namespace {
 
-constexpr double kGovernorBand = 0.5;  // below the top speed, over which the drive fades out [m/s]
+// The governor's gain times the drive's lag: critically damped, so that the top speed is not overshot
+// [1].
+constexpr double kGovernorGain = 0.25;
 
 }  // namespace
 
@@ -26,9 +28,10 @@ void DriveTrain::reset(double brake_temperature) {
 void DriveTrain::step(double acceleration, double speed, double dt) {
   const DriveAndBrakes& p = parameters_;
   const double asked = mass_ * acceleration;
-  const double governor = std::clamp((p.max_speed - speed) / kGovernorBand, 0.0, 1.0);
+  const double governor =
+      mass_ * (kGovernorGain / p.drive_lag * (p.max_speed - speed) + p.rolling_resistance * kGravity);
   const double fade = p.brake_fade * std::clamp(temperature_ / p.brake_fade_temperature, 0.0, 1.0);
-  const double drive = std::clamp(asked, 0.0, drive_limit_ * governor);
+  const double drive = std::max(0.0, std::min({asked, drive_limit_, governor}));
   const double brake = std::clamp(-asked, 0.0, brake_limit_ * (1.0 - fade));
   drive_force_ += (drive - drive_force_) * dt / (p.drive_lag + dt);
   brake_force_ += (brake - brake_force_) * dt / (p.brake_lag + dt);

@@ -21,7 +21,7 @@ void QuarterTruck::step(double road, double transfer, double dt) {
   const double spring =
       suspension_.stiffness * (body_ - wheel_) + suspension_.damping * (body_speed_ - wheel_speed_);
   load_ = std::max(0.0, static_load_ + suspension_.tyre_stiffness * (road - wheel_));
-  body_speed_ += dt * (transfer - spring) / sprung_mass_;
+  body_speed_ += dt * (-transfer - spring) / sprung_mass_;
   wheel_speed_ += dt * (spring + load_ - static_load_) / suspension_.unsprung_mass;
   body_ += dt * body_speed_;
   wheel_ += dt * wheel_speed_;

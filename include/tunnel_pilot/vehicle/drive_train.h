@@ -7,7 +7,7 @@ namespace tunnel_pilot::vehicle {
 /// Four-wheel drive and brakes of a truck that knows its payload: an acceleration a asks for the force
 /// m a (rolling resistance and grade are not made up for, so that zero coasts). Force limits are those
 /// that give the stated acceleration and deceleration on the flat, loaded, rolling resistance included.
-/// First order lags. Toward the top speed the drive fades out. Brakes heat up and fade:
+/// First order lags. A governor takes the drive back toward the top speed. Brakes heat up and fade:
 ///   C T' = F_b |v| - C T / tau,   limit (1 - fade min(1, T / T_fade))
 /// Forces [N], T [K] above the surroundings.
 class DriveTrain {

@@ -5,7 +5,7 @@
 namespace tunnel_pilot::vehicle {
 
 /// One axle's vertical motion about its static equilibrium (the quarter-truck, here for a whole axle):
-///   m_s z_s'' = -k (z_s - z_u) - c (z_s' - z_u') + transfer
+///   m_s z_s'' = -k (z_s - z_u) - c (z_s' - z_u') - transfer
 ///   m_u z_u'' =  k (z_s - z_u) + c (z_s' - z_u') + k_t (road - z_u)
 ///   F_z = max(0, static load + k_t (road - z_u))
 /// Heights [m], upward; forces [N]. Steps of at most 1 ms.
@@ -17,7 +17,7 @@ class QuarterTruck {
   /// At rest on a road of this height.
   void reset(double road);
 
-  /// `transfer` is the load that accelerating moves onto the sprung mass [N].
+  /// `transfer` is the load that driving, braking and grade add to this axle [N].
   void step(double road, double transfer, double dt);
 
   double bodyHeight() const { return body_; }
