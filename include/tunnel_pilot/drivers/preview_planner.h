@@ -1,0 +1,98 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include <Eigen/Core>
+
+#include "tunnel_pilot/geometry/path.h"
+#include "tunnel_pilot/vehicle/truck_parameters.h"
+
+namespace tunnel_pilot::drivers {
+
+/// State of the truck beside a path, as the steering's command will find it: command is the articulation
+/// demand that acts now (the dead time has passed).
+struct PathState {
+  double s = 0.0;              ///< foot point on the path [m]
+  double offset = 0.0;         ///< e_y, left of the path [m]
+  double heading_error = 0.0;  ///< e_psi, body heading minus path direction [rad]
+  double articulation = 0.0;   ///< gamma [rad]
+  double command = 0.0;        ///< u [rad]
+};
+
+/// What the driver knows of the truck's answer to steering.
+struct TruckResponse {
+  vehicle::TruckGeometry geometry;
+  double lag;              ///< of the articulation behind its command [s]
+  double max_rate;         ///< of articulation and command [rad/s]
+  double max_articulation; ///< highest command [rad]
+  double slip_compliance;  ///< tyre slip angle per lateral acceleration, 1/(g C) [rad s^2/m]
+};
+
+struct PreviewWeights {
+  double offset;    ///< [1/m^2]
+  double heading;   ///< [1/rad^2]
+  double rate;      ///< of the command's rate [s^2/rad^2]
+  double terminal;  ///< factor on offset and heading at the horizon's end [1]
+};
+
+/// Optimal preview: finds the command rates w over the horizon that minimise
+///   sum of  q_y e_y^2 + q_psi (e_psi + beta)^2 + r w^2
+/// along the previewed path, under |w| <= max_rate, for the truck's exact kinematics
+///   theta_dot = (v sin(gamma) + l_r gamma_dot) / (l_f cos(gamma) + l_r) + v d
+///   e_psi_dot = theta_dot - v kappa cos(e_psi) / (1 - kappa e_y),   beta = -v theta_dot / (g C)
+///   e_y_dot   = v sin(e_psi + beta),   gamma_dot = sat((u - gamma) / lag),   u_dot = w
+/// (Corke & Ridley 2001 in path-error form, with the tyres' quasi-static slip angle beta and a measured
+/// curvature disturbance d). On a path that the steering can follow the optimum is the exact curvature
+/// inversion; where the path's curvature steps, it steers ahead and rounds the step off.
+/// Method: one differential-dynamic-programming sweep with a clamped scalar control (Tassa, Mansard &
+/// Todorov 2014, "Control-limited DDP") per call, started from the last call's solution shifted in time.
+class PreviewPlanner {
+ public:
+  static constexpr std::size_t kStages = 32;
+
+  PreviewPlanner(const TruckResponse& truck, const PreviewWeights& weights, double step);
+
+  /// Command rate to apply from now on [rad/s]. `elapsed` [s] since the last plan shifts the start; speed
+  /// [m/s] is held over the horizon, `disturbance` is d [1/m]. The path must not be empty.
+  double plan(const PathState& now, const geometry::Path& path, double speed, double disturbance,
+              double elapsed);
+  void reset();
+
+  /// One step of the model with the mean curvature of the path over the step.
+  PathState advance(const PathState& state, double command_rate, double speed, double curvature,
+                    double disturbance, double step) const;
+
+  double horizon() const { return kStages * step_; }  ///< [s]
+  /// State that the plan reaches after `stage` steps.
+  const PathState& planned(std::size_t stage) const { return states_[stage]; }
+
+ private:
+  using Vector = Eigen::Vector4d;  ///< (offset, heading error, articulation, command)
+  struct Linear;                   ///< derivatives of one step
+
+  void shift(double elapsed);
+  /// Follows the plan from `now`; with `correct`, the last sweep's corrections are applied to it.
+  /// Returns the cost.
+  double roll(const PathState& now, const geometry::Path& path, double speed, double disturbance,
+              bool correct);
+  void sweep(double speed);
+  Linear linearise(const PathState& state, double rate, double speed, double curvature) const;
+  /// Heading error with which the course follows a path of this curvature despite tyre slip [rad].
+  double courseOffset(double speed, double curvature) const {
+    return truck_.slip_compliance * speed * speed * curvature;
+  }
+  double cost(const PathState& state, double curvature, double speed) const;
+
+  TruckResponse truck_;
+  PreviewWeights weights_;
+  double step_;   ///< [s]
+  double share_;  ///< of the way to the command that the articulation goes in one step [1]
+  std::array<double, kStages> rates_{};       ///< the plan [rad/s]
+  std::array<double, kStages> curvatures_{};  ///< met on the way [1/m]
+  std::array<PathState, kStages + 1> states_{};
+  std::array<double, kStages> corrections_{};  ///< of the last sweep [rad/s]
+  std::array<Vector, kStages> gains_{};        ///< feedback of the last sweep
+};
+
+}  // namespace tunnel_pilot::drivers

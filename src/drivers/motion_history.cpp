@@ -1,0 +1,49 @@
+#include "tunnel_pilot/drivers/motion_history.h"
+
+#include <cmath>
+
+namespace tunnel_pilot::drivers {
+
+bool isFinite(const Motion& motion) {
+  return std::isfinite(motion.pose.x) && std::isfinite(motion.pose.y) &&
+         std::isfinite(motion.pose.heading) && std::isfinite(motion.speed) &&
+         std::isfinite(motion.yaw_rate) && std::isfinite(motion.articulation) &&
+         std::isfinite(motion.articulation_rate);
+}
+
+geometry::Pose advanced(const geometry::Pose& pose, double speed, double yaw_rate, double time) {
+  const double turn = yaw_rate * time;
+  // The chord of the arc points to its middle heading; 1 - turn^2/24 is its length over the arc's.
+  const double chord = speed * time * (1.0 - turn * turn / 24.0);
+  return pose.compose({chord * std::cos(0.5 * turn), chord * std::sin(0.5 * turn), turn});
+}
+
+void MotionHistory::add(const Motion& motion) {
+  if (!isFinite(motion) || (size_ > 0 && motion.stamp <= latest().stamp)) return;
+  newest_ = (newest_ + 1) % ring_.size();
+  ring_[newest_] = motion;
+  if (size_ < ring_.size()) ++size_;
+}
+
+const Motion& MotionHistory::sample(std::size_t age) const {
+  return ring_[(newest_ + ring_.size() - age) % ring_.size()];
+}
+
+std::optional<geometry::Pose> MotionHistory::poseAt(Stamp stamp) const {
+  if (size_ == 0) return std::nullopt;
+  std::size_t age = 0;
+  while (age < size_ && sample(age).stamp > stamp) ++age;
+  if (age == 0 || age == size_) {
+    const Motion& end = age == 0 ? latest() : sample(size_ - 1);
+    const Stamp beyond = stamp - end.stamp;
+    if (beyond > kReach || beyond < -kReach) return std::nullopt;
+    return advanced(end.pose, end.speed, end.yaw_rate, toSeconds(beyond));
+  }
+  const Motion& before = sample(age);
+  const Motion& after = sample(age - 1);
+  const double t = toSeconds(stamp - before.stamp) / toSeconds(after.stamp - before.stamp);
+  const geometry::Pose step = before.pose.relative(after.pose);
+  return before.pose.compose({t * step.x, t * step.y, t * step.heading});
+}
+
+}  // namespace tunnel_pilot::drivers

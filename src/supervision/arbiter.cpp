@@ -1,0 +1,437 @@
+#include "tunnel_pilot/supervision/arbiter.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tunnel_pilot::supervision {
+namespace {
+
+constexpr double kProfileSpacing = 0.5;  // [m]
+constexpr double kStanding = 0.05;       // [m/s]
+
+double age(const std::optional<Stamp>& since, Stamp now) {
+  return since ? toSeconds(now - *since) : std::numeric_limits<double>::infinity();
+}
+
+bool isPossible(const drivers::Proposal& proposal) {
+  return std::isfinite(proposal.articulation_angle) && std::isfinite(proposal.speed) &&
+         std::abs(proposal.articulation_angle) < M_PI_2 && proposal.speed >= 0.0;
+}
+
+}  // namespace
+
+int gravity(Reason reason) {
+  constexpr std::array<Reason, 24> kRising = {
+      Reason::kNotEngaged,      Reason::kStartUp,         Reason::kOperatorRelease,
+      Reason::kLimitsHit,       Reason::kNoSource,        Reason::kSourceStale,
+      Reason::kProposalInvalid, Reason::kTunnelInvalid,   Reason::kClearance,
+      Reason::kObstacle,        Reason::kScanRejected,    Reason::kScanFrozen,
+      Reason::kScanStale,       Reason::kSpeedImplausible, Reason::kMotionStale,
+      Reason::kCommandStale,    Reason::kTrackingError,   Reason::kFeedbackCorrupt,
+      Reason::kFeedbackStale,   Reason::kBusFault,        Reason::kTruckFault,
+      Reason::kClockJump,       Reason::kOperatorOverride, Reason::kOperatorStop};
+  const auto place = std::find(kRising.begin(), kRising.end(), reason);
+  return place == kRising.end() ? 0 : static_cast<int>(place - kRising.begin()) + 1;
+}
+
+void Arbiter::Findings::stopFor(Reason reason) {
+  if (gravity(reason) > gravity(stop)) stop = reason;
+}
+
+void Arbiter::Findings::slowFor(Reason reason) {
+  if (gravity(reason) > gravity(slow)) slow = reason;
+}
+
+Arbiter::Arbiter(const ArbiterParameters& parameters, const vehicle::TruckParameters& truck)
+    : parameters_(parameters),
+      truck_(truck),
+      governor_(parameters.governor),
+      envelope_(parameters.envelope, parameters.limiter, truck.geometry),
+      limiter_(parameters.limiter, truck.geometry),
+      steering_monitor_(truck.steering, parameters.tracking_tolerance, parameters.tracking_time) {}
+
+// ---- inputs
+
+void Arbiter::setProposal(Source source, const drivers::Proposal& proposal, Stamp now) {
+  slots_.at(static_cast<std::size_t>(source)) = {proposal, now};
+}
+
+void Arbiter::setWalls(const perception::Walls& walls, Stamp) { walls_ = walls; }
+
+void Arbiter::takeScan(Stamp stamp, Stamp now) {
+  points_stamp_ = stamp;
+  scan_received_ = now;
+}
+
+void Arbiter::setTunnel(const perception::Tunnel& tunnel, Stamp now) {
+  tunnel_state_ = tunnel.state;
+  tunnel_received_ = now;
+  if (!tunnel.state.valid || tunnel.centerline.empty()) return;
+  const std::optional<geometry::Pose> pose = history_.poseAt(tunnel.state.stamp);
+  tunnel_valid_received_ = now;
+  centerline_ = tunnel.centerline;
+  centerline_pose_ = pose;
+  profile_.build(centerline_, truck_.geometry, kProfileSpacing);
+}
+
+void Arbiter::setMotion(const drivers::Motion& motion, Stamp now) {
+  motion_finite_ = drivers::isFinite(motion);
+  if (!motion_finite_) return;
+  history_.add(motion);
+  motion_received_ = now;
+}
+
+void Arbiter::setTruckState(const TruckState& state, Stamp now) {
+  truck_state_ = state;
+  truck_state_received_ = now;
+  const bool at_rest = !state.engaged && !state.stopping;
+  if (at_rest && latched_ && age(latched_at_, now) > parameters_.recovery_time) latched_.reset();
+}
+
+void Arbiter::requestStop(Stamp now) {
+  latched_ = Reason::kOperatorStop;
+  latched_at_ = now;
+}
+
+bool Arbiter::reset(Stamp now) {
+  const bool moves = !history_.empty() && std::abs(history_.latest().speed) > kStanding;
+  if (moves || assess(now).stop != Reason::kNone) return false;
+  latched_.reset();
+  return true;
+}
+
+void Arbiter::clockJumped() {
+  if (engaged() && !latched_) {
+    latched_ = Reason::kClockJump;
+    latched_at_.reset();
+  }
+  slots_ = {};
+  history_.clear();
+  envelope_.reset();
+  scan_received_.reset();
+  tunnel_received_.reset();
+  tunnel_valid_received_.reset();
+  motion_received_.reset();
+  truck_state_received_.reset();
+  centerline_pose_.reset();
+  corridor_stamp_.reset();
+  slow_until_.reset();
+  last_hit_.reset();
+  last_.reset();
+  hits_ = 0;
+  obstructed_scans_ = 0;
+}
+
+// ---- findings
+
+bool Arbiter::engaged() const { return !parameters_.needs_truck_state || truck_state_.engaged; }
+
+Arbiter::Health Arbiter::health(const SourceRule& rule, Stamp now) const {
+  const Slot& slot = slots_[static_cast<std::size_t>(rule.source)];
+  if (!slot.received) return Health::kNever;
+  const double stamp_age = toSeconds(now - slot.proposal.stamp);
+  if (age(slot.received, now) > rule.max_age || stamp_age > parameters_.max_stamp_age) {
+    return Health::kStale;
+  }
+  if (!isPossible(slot.proposal) || stamp_age < -parameters_.max_future) return Health::kInvalid;
+  return slot.proposal.valid ? Health::kHealthy : Health::kUnable;
+}
+
+const SourceRule* Arbiter::bestSource(Stamp now) const {
+  const SourceRule* best = nullptr;
+  for (const SourceRule& rule : parameters_.sources) {
+    if (!rule.steers || (best && best->priority > rule.priority)) continue;
+    if (health(rule, now) == Health::kHealthy) best = &rule;
+  }
+  return best;
+}
+
+void Arbiter::assessScan(Stamp now, Findings& findings) const {
+  if (!scan_received_) return findings.stopFor(Reason::kStartUp);
+  const double received = age(scan_received_, now);
+  const double oldest = std::max(received, toSeconds(now - points_stamp_));
+  if (oldest > parameters_.scan_stop_age) findings.stopFor(Reason::kScanStale);
+  if (received > parameters_.scan_degraded_age) findings.slowFor(Reason::kScanStale);
+  if (!parameters_.wall_checks) return;
+  if (!corridor_stamp_) return findings.stopFor(Reason::kStartUp);
+  if (toSeconds(now - *corridor_stamp_) > parameters_.scan_stop_age) {
+    findings.stopFor(Reason::kScanStale);
+  }
+}
+
+void Arbiter::assessTunnel(Stamp now, Findings& findings) const {
+  if (!tunnel_received_) return findings.stopFor(Reason::kStartUp);
+  const double without = age(tunnel_valid_received_, now);
+  if (without > parameters_.tunnel_grace) findings.stopFor(Reason::kTunnelInvalid);
+  if (without > parameters_.scan_degraded_age) findings.slowFor(Reason::kTunnelInvalid);
+}
+
+bool Arbiter::motionHealthy(Stamp now) const {
+  return motion_finite_ && !history_.empty() &&
+         age(motion_received_, now) <= parameters_.motion_stop_age &&
+         toSeconds(now - history_.latest().stamp) <= parameters_.max_stamp_age;
+}
+
+void Arbiter::assessMotion(Stamp now, Findings& findings) const {
+  if (!motion_received_ && motion_finite_) return findings.stopFor(Reason::kStartUp);
+  if (!motionHealthy(now)) findings.stopFor(Reason::kMotionStale);
+  if (steering_monitor_.failed()) findings.stopFor(Reason::kTrackingError);
+}
+
+void Arbiter::assessTruck(Stamp now, Findings& findings) const {
+  if (!parameters_.needs_truck_state) return;
+  if (!truck_state_received_) return findings.stopFor(Reason::kStartUp);
+  if (truck_state_.stopping) findings.stopFor(truck_state_.reason);
+  if (age(truck_state_received_, now) > parameters_.truck_state_stop_age) {
+    findings.stopFor(Reason::kFeedbackStale);
+  }
+}
+
+// Without a healthy source the truck stops, unless what the sources lack is about to be judged by itself:
+// a late scan or an invalid tunnel, each with its own grace.
+void Arbiter::assessSources(Stamp now, Findings& findings) const {
+  if (bestSource(now)) return;
+  const bool scan_late = age(scan_received_, now) > parameters_.scan_degraded_age;
+  const bool tunnel_lost = tunnel_received_ && !tunnel_state_.valid;
+  Findings causes;
+  bool excused = false;
+  for (const SourceRule& rule : parameters_.sources) {
+    if (!rule.steers) continue;
+    switch (health(rule, now)) {
+      case Health::kNever: causes.stopFor(Reason::kStartUp); break;
+      case Health::kInvalid: causes.stopFor(Reason::kProposalInvalid); break;
+      case Health::kStale:
+        causes.stopFor(Reason::kSourceStale);
+        excused = excused || scan_late;
+        break;
+      case Health::kUnable:
+        causes.stopFor(Reason::kNoSource);
+        excused = excused || tunnel_lost;
+        break;
+      case Health::kHealthy: break;
+    }
+  }
+  if (!excused) findings.stopFor(causes.stop);
+}
+
+Arbiter::Findings Arbiter::assess(Stamp now) const {
+  Findings findings;
+  assessScan(now, findings);
+  assessTunnel(now, findings);
+  assessMotion(now, findings);
+  assessTruck(now, findings);
+  assessSources(now, findings);
+  if (obstructed_scans_ >= parameters_.obstacle_scans) findings.stopFor(obstruction_);
+  if (hits_ >= parameters_.limit_hits) findings.slowFor(Reason::kLimitsHit);
+  return findings;
+}
+
+// ---- choices
+
+Arbiter::Steering Arbiter::chooseSteering(Stamp now) const {
+  if (const SourceRule* best = bestSource(now)) {
+    const drivers::Proposal& proposal = slots_[static_cast<std::size_t>(best->source)].proposal;
+    return {best->source, proposal.articulation_angle, proposal.stamp};
+  }
+  if (const std::optional<Steering> reckoned = deadReckoning(now)) return *reckoned;
+  const Stamp stamp = history_.empty() ? Stamp{} : history_.latest().stamp;
+  return {Source::kHold, limiter_.articulation(), stamp};
+}
+
+std::optional<geometry::Pose> Arbiter::placeInCenterline(Stamp now) const {
+  if (!centerline_pose_ || profile_.empty()) return std::nullopt;
+  const std::optional<geometry::Pose> here = history_.poseAt(now);
+  if (!here) return std::nullopt;
+  return centerline_pose_->relative(*here);
+}
+
+// Along the last measured centerline; the law looks ahead by the steering's own delay.
+std::optional<Arbiter::Steering> Arbiter::deadReckoning(Stamp now) const {
+  if (!motionHealthy(now) || age(tunnel_valid_received_, now) > parameters_.dead_reckoning_age) {
+    return std::nullopt;
+  }
+  const std::optional<geometry::Pose> here = placeInCenterline(now);
+  if (!here) return std::nullopt;
+  const drivers::Motion& motion = history_.latest();
+  const geometry::Pose ahead = drivers::advanced(*here, motion.speed, motion.yaw_rate,
+                                                 truck_.steering.dead_time + truck_.steering.lag);
+  const geometry::PathProjection place = centerline_.project(ahead.position());
+  const double articulation = drivers::followPath(
+      profile_, parameters_.envelope.follower, place.s, place.lateral_offset,
+      geometry::wrapAngle(ahead.heading - place.heading), parameters_.limiter.max_articulation);
+  return Steering{Source::kDeadReckoning, articulation, motion.stamp};
+}
+
+Arbiter::Speed Arbiter::chooseSpeed(Stamp now) {
+  Speed lowest{parameters_.governor.max_speed, Source::kNone, SpeedLimit::kNone};
+  const auto take = [&lowest](double speed, SpeedLimit by) {
+    if (speed < lowest.value) lowest = {speed, lowest.source, by};
+  };
+  if (const std::optional<geometry::Pose> here = placeInCenterline(now)) {
+    const double s = centerline_.project(here->position()).s;
+    const SpeedGovernor::Limit limit = governor_.alongPath(profile_, s);
+    take(limit.speed, limit.by);
+    if (!parameters_.wall_checks) {
+      take(governor_.stoppingWithin(centerline_.points().back().s - s), SpeedLimit::kSight);
+    }
+  }
+  if (corridor_stamp_) {
+    const bool blocked = envelope_.result().free_until != Envelope::End::kSight;
+    take(governor_.stoppingWithin(freeDistance()),
+         blocked ? SpeedLimit::kObstacle : SpeedLimit::kSight);
+  }
+  decision_.speed_limit = lowest.value;
+  for (const SourceRule& rule : parameters_.sources) {
+    if (!rule.gives_speed || health(rule, now) != Health::kHealthy) continue;
+    const double speed = slots_[static_cast<std::size_t>(rule.source)].proposal.speed;
+    if (speed < lowest.value) lowest = {speed, rule.source, SpeedLimit::kDriver};
+  }
+  return lowest;
+}
+
+// ---- the corridor
+
+double Arbiter::freeDistance() const {
+  return std::max(0.0, envelope_.result().free_distance - driven_since_corridor_);
+}
+
+// Compares each scan once, when its points, walls and tunnel have all come; in between, the way driven
+// eats up the free distance.
+void Arbiter::updateCorridor(double commanded, Stamp now) {
+  if (!parameters_.wall_checks || history_.empty()) return;
+  const bool complete = scan_received_ && tunnel_received_ && walls_.stamp == points_stamp_ &&
+                        tunnel_state_.stamp == points_stamp_;
+  const bool fresh = !corridor_stamp_ || *corridor_stamp_ != points_stamp_;
+  const drivers::Motion& motion = history_.latest();
+  const std::optional<geometry::Pose> scan_pose = history_.poseAt(points_stamp_);
+  const std::optional<geometry::Pose> here = history_.poseAt(now);
+  if (!complete || !fresh || !scan_pose || !here) {
+    driven_since_corridor_ += std::abs(motion.speed) * age(last_ ? last_ : now, now);
+    return;
+  }
+  const geometry::Pose path_frame =
+      centerline_pose_ ? scan_pose->relative(*centerline_pose_) : geometry::Pose{};
+  envelope_.update({walls_, points_, centerline_, centerline_pose_ ? profile_ : no_profile_, path_frame,
+                    scan_pose->relative(*here), *scan_pose, motion.articulation, commanded,
+                    std::abs(motion.speed)});
+  corridor_stamp_ = points_stamp_;
+  driven_since_corridor_ = 0.0;
+  const Envelope::Result& result = envelope_.result();
+  const double needed = envelope_.stoppingDistance(std::abs(motion.speed)) + parameters_.envelope.reserve;
+  const bool obstructed =
+      result.free_until != Envelope::End::kSight && result.free_distance < needed;
+  obstructed_scans_ = obstructed ? obstructed_scans_ + 1 : 0;
+  obstruction_ =
+      result.free_until == Envelope::End::kWall ? Reason::kClearance : Reason::kObstacle;
+}
+
+void Arbiter::tellCorridor() {
+  const double unknown = std::numeric_limits<double>::quiet_NaN();
+  const bool known = corridor_stamp_.has_value();
+  const Envelope::Result& result = envelope_.result();
+  decision_.clearance_left = known ? result.clearance_left : unknown;
+  decision_.clearance_right = known ? result.clearance_right : unknown;
+  decision_.free_distance = known ? freeDistance() : unknown;
+  decision_.stopping_distance =
+      history_.empty() ? unknown : envelope_.stoppingDistance(std::abs(history_.latest().speed));
+  decision_.corridor_left = result.corridor_left;
+  decision_.corridor_right = result.corridor_right;
+}
+
+// ---- the decision
+
+void Arbiter::watchClock(Stamp now) {
+  if (!last_) return;
+  const double step = toSeconds(now - *last_);
+  if (step < 0.0 || step > parameters_.clock_jump) clockJumped();
+}
+
+// A stop stays until the operator's reset. Before the first inputs there is nothing to latch, unless the
+// truck is already under way (the arbiter was started anew).
+void Arbiter::latch(Findings& findings, Stamp now) {
+  const bool counts = findings.stop != Reason::kStartUp || parameters_.needs_truck_state;
+  if (engaged() && findings.stop != Reason::kNone && counts && !latched_) {
+    latched_ = findings.stop;
+    latched_at_ = now;
+  }
+  if (latched_) findings.stop = *latched_;
+}
+
+bool Arbiter::slowNow(Reason found, Stamp now) {
+  if (found != Reason::kNone) {
+    slow_reason_ = found;
+    slow_until_ = now + fromSeconds(parameters_.recovery_time);
+  }
+  return slow_until_ && *slow_until_ > now;
+}
+
+void Arbiter::watchLimits(const CommandLimiter::Flags& fired, Stamp now) {
+  if (age(last_hit_, now) > parameters_.recovery_time) hits_ = 0;
+  if (!(fired.angle || fired.lateral_acceleration) || !engaged()) return;
+  ++hits_;
+  last_hit_ = now;
+}
+
+const Decision& Arbiter::decide(Stamp now) {
+  watchClock(now);
+  const Steering steering = chooseSteering(now);
+  updateCorridor(steering.articulation, now);
+  Findings findings = assess(now);
+  latch(findings, now);
+  Speed speed = chooseSpeed(now);
+  const bool stop = findings.stop != Reason::kNone;
+  decision_.degraded = slowNow(findings.slow, now) && !stop;
+  if (decision_.degraded && parameters_.degraded_speed < speed.value) {
+    speed = {parameters_.degraded_speed, Source::kNone, SpeedLimit::kDegraded};
+  }
+  if (stop) speed = {0.0, Source::kNone, SpeedLimit::kStop};
+  letOut(steering, speed, stop, now);
+  decision_.command.reason = reasonOf(findings.stop, speed);
+  tellCorridor();
+  last_ = now;
+  return decision_;
+}
+
+Reason Arbiter::reasonOf(Reason stop, const Speed& speed) const {
+  if (stop != Reason::kNone) return stop;
+  if (!engaged()) return Reason::kNotEngaged;
+  if (decision_.degraded) return slow_reason_;
+  if (speed.value > kStanding) return Reason::kNone;
+  if (speed.by == SpeedLimit::kObstacle) return Reason::kObstacle;
+  return speed.by == SpeedLimit::kSight ? Reason::kTunnelInvalid : Reason::kNone;
+}
+
+// The only place where a command is made. While others steer, it starts from where the truck stands.
+void Arbiter::letOut(const Steering& steering, const Speed& speed, bool stop, Stamp now) {
+  const bool obeyed = engaged() || truck_state_.stopping;
+  const double measured_speed = history_.empty() ? 0.0 : history_.latest().speed;
+  const double measured = history_.empty() ? limiter_.articulation() : history_.latest().articulation;
+  if (!obeyed || (!started_ && !history_.empty())) {
+    limiter_.start(measured, measured_speed);
+    steering_monitor_.start(measured, now);
+    started_ = !history_.empty();
+  }
+  const double elapsed = last_ ? toSeconds(now - *last_) : 0.0;
+  const CommandLimiter::Result result =
+      limiter_.limit({steering.articulation, speed.value, measured_speed, stop}, elapsed);
+  if (obeyed && motionHealthy(now)) {
+    steering_monitor_.update(result.articulation, measured, measured_speed, now);
+  }
+  watchLimits(result.fired, now);
+  Command& command = decision_.command;
+  command.stamp = steering.stamp;
+  ++command.sequence;
+  command.articulation_angle = result.articulation;
+  command.speed = result.speed;
+  command.acceleration = result.acceleration;
+  command.stop = stop;
+  command.mode = !obeyed                                       ? Mode::kStandby
+                 : steering.source == Source::kTeleoperation ? Mode::kTeleoperation
+                                                               : Mode::kAutonomous;
+  command.source = steering.source;
+  decision_.speed_source = speed.source;
+  decision_.limited_by = speed.by;
+  decision_.limits = result.fired;
+}
+
+}  // namespace tunnel_pilot::supervision

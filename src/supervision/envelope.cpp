@@ -1,0 +1,284 @@
+#include "tunnel_pilot/supervision/envelope.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tunnel_pilot/vehicle/articulation.h"
+
+namespace tunnel_pilot::supervision {
+namespace {
+
+using geometry::Point;
+using geometry::Pose;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kStep = 1.0;            // [m] between stations and between swept poses
+constexpr double kLeastWay = 6.0;        // [m] swept ahead of the front axle at any speed
+constexpr double kMemoryStep = 0.5;      // [m] driven between remembered walls
+constexpr double kSlowest = 0.5;         // [m/s] for the steering's slope over the way
+
+Point direction(double heading) { return {std::cos(heading), std::sin(heading)}; }
+Point leftOf(const Point& d) { return {-d.y(), d.x()}; }
+
+}  // namespace
+
+EnvelopeParameters loadEnvelope(config::Node node) {
+  EnvelopeParameters p{};
+  p.margin = node.number("margin", "m", 0.0, 2.0);
+  p.smallest_obstacle = node.number("smallest_obstacle", "m", 0.05, 2.0);
+  p.obstacle_points = static_cast<int>(node.integer("obstacle_points", "1", 1, 50));
+  p.deceleration = node.number("deceleration", "m/s^2", 0.1, 5.0);
+  p.reaction_time = node.number("reaction_time", "s", 0.0, 3.0);
+  p.reserve = node.number("reserve", "m", 0.0, 10.0);
+  p.horizon = node.number("horizon", "m", 6.0, 60.0);
+  config::Node follower = node.child("follower");
+  p.follower.offset = follower.number("offset", "rad/m", 0.01, 2.0);
+  p.follower.heading = follower.number("heading", "1", 0.1, 10.0);
+  follower.finish();
+  node.finish();
+  return p;
+}
+
+Envelope::Envelope(const EnvelopeParameters& parameters, const CommandLimiterParameters& limits,
+                   const vehicle::TruckGeometry& geometry)
+    : parameters_(parameters), limits_(limits), geometry_(geometry) {
+  stations_.reserve(static_cast<std::size_t>(parameters.horizon / kStep) + 32);
+}
+
+void Envelope::reset() { remembered_ = 0; }
+
+double Envelope::stoppingDistance(double speed) const {
+  return speed * parameters_.reaction_time + speed * speed / (2.0 * parameters_.deceleration);
+}
+
+const Envelope::Result& Envelope::update(const Input& input) {
+  stations_.clear();
+  wall_end_ = 0.0;
+  result_.free_distance = kInfinity;
+  result_.free_until = End::kSight;
+  layTruck(input);
+  layWay(input);
+  layWall(input.walls.left, true);
+  layWall(input.walls.right, false);
+  layMemory(input);
+  remember(input);
+  limitSight(input);
+  compareWalls();
+  findObstacles(input.points);
+  drawCorridor();
+  return result_;
+}
+
+void Envelope::addStation(const Point& point, double heading, double s) {
+  stations_.push_back({point, direction(heading), s, -kInfinity, kInfinity, kInfinity, -kInfinity});
+}
+
+// The spine from the tail through rear body, hinge and front body to the front axle.
+void Envelope::layTruck(const Input& input) {
+  const Pose rear = vehicle::rearPose(geometry_, input.truck, input.articulation);
+  const double hinge = geometry_.front_axle_to_hinge;
+  const double tail = hinge + geometry_.rear_axle_to_hinge + geometry_.rear_overhang;
+  for (double back = std::ceil(tail); back > 0.5; back -= kStep) {
+    const bool on_front = back <= hinge;
+    const Pose& body = on_front ? input.truck : rear;
+    const double x = on_front ? -back : geometry_.rear_axle_to_hinge + hinge - back;
+    addStation(body.transform({x, 0.0}), body.heading, -back);
+  }
+  front_axle_ = stations_.size();
+}
+
+// The spine ahead: the front axle's expected way, and the bodies swept along it.
+void Envelope::layWay(const Input& input) {
+  const double way = std::min(parameters_.horizon, kLeastWay + 2.0 * stoppingDistance(input.speed));
+  const double held = input.speed * parameters_.reaction_time;
+  const double slope = limits_.max_articulation_rate / std::max(input.speed, kSlowest);
+  const bool on_path = !input.profile.empty();
+  geometry::PathProjection place;
+  const Pose on_centerline = input.path_frame.relative(input.truck);
+  if (on_path) place = input.centerline.project(on_centerline.position());
+  double heading_error = geometry::wrapAngle(on_centerline.heading - place.heading);
+  Pose pose = input.truck;
+  double articulation = input.articulation;
+  std::vector<Posture>& postures = postures_;
+  postures.clear();
+  for (double s = 0.0;; s += kStep) {
+    addStation(pose.position(), pose.heading, s);
+    postures.push_back({pose, articulation});
+    if (s + kStep > way) break;
+    const double target =
+        on_path && s >= held
+            ? drivers::followPath(input.profile, parameters_.follower, place.s, place.lateral_offset,
+                                  heading_error, limits_.max_articulation)
+            : input.commanded_articulation;
+    const double change = std::clamp(target - articulation, -slope * kStep, slope * kStep);
+    const double turn = vehicle::yawRate(geometry_, kStep, articulation + 0.5 * change, change);
+    articulation += change;
+    pose = pose.compose({kStep * std::cos(0.5 * turn), kStep * std::sin(0.5 * turn), turn});
+    if (!on_path) continue;
+    const double curvature = input.profile.curvatureAt(place.s);
+    place.lateral_offset += kStep * std::sin(heading_error + 0.5 * (turn - curvature * kStep));
+    place.s += kStep;
+    heading_error += turn - curvature * kStep;
+  }
+  const Pose& last = postures.back().front;
+  for (double beyond = kStep; beyond < geometry_.front_overhang + kStep; beyond += kStep) {
+    addStation(last.transform({beyond, 0.0}), last.heading, stations_.back().s + kStep);
+  }
+  for (std::size_t i = 0; i < postures.size(); ++i) sweepBodies(front_axle_ + i, postures[i]);
+}
+
+void Envelope::sweepBodies(std::size_t station, const Posture& posture) {
+  const double half = 0.5 * geometry_.overall_width;
+  const Pose rear = vehicle::rearPose(geometry_, posture.front, posture.articulation);
+  const double to_rear = geometry_.front_axle_to_hinge + geometry_.rear_axle_to_hinge;
+  const auto sweep = [&](const Pose& body, double x, double along) {
+    const auto near = static_cast<std::size_t>(
+        std::max(0.0, static_cast<double>(station) + std::floor(along / kStep)));
+    for (const double side : {half, -half}) {
+      const Beside place = beside(body.transform({x, side}), near);
+      Station& swept = stations_[place.station];
+      swept.left = std::max(swept.left, place.lateral);
+      swept.right = std::min(swept.right, place.lateral);
+    }
+  };
+  for (const double x : {geometry_.front_overhang, 0.0, -geometry_.front_axle_to_hinge}) {
+    sweep(posture.front, x, x);
+  }
+  const double hinge = geometry_.rear_axle_to_hinge;
+  for (const double x : {hinge, 0.5 * hinge, 0.0, -geometry_.rear_overhang}) {
+    sweep(rear, x, x - to_rear);
+  }
+}
+
+Envelope::Beside Envelope::beside(const Point& point, std::size_t near) const {
+  std::size_t i = std::min(near, stations_.size() - 1);
+  double along = (point - stations_[i].point).dot(stations_[i].direction);
+  while (along >= kStep && i + 1 < stations_.size()) {
+    ++i;
+    along = (point - stations_[i].point).dot(stations_[i].direction);
+  }
+  while (along < 0.0 && i > 0) {
+    --i;
+    along = (point - stations_[i].point).dot(stations_[i].direction);
+  }
+  const double lateral = (point - stations_[i].point).dot(leftOf(stations_[i].direction));
+  return {i, stations_[i].s + along, lateral};
+}
+
+void Envelope::placeWall(const Beside& place, bool left) {
+  Station& station = stations_[place.station];
+  if (left) {
+    station.wall_left = std::min(station.wall_left, place.lateral);
+  } else {
+    station.wall_right = std::max(station.wall_right, place.lateral);
+  }
+}
+
+void Envelope::layWall(const perception::Wall& wall, bool left) {
+  if (!wall.found) return;
+  std::size_t near = front_axle_;
+  for (const Point& point : wall.curve) {
+    const Beside place = beside(point, near);
+    near = place.station;
+    wall_end_ = std::max(wall_end_, place.s);
+    if (place.s <= stations_.back().s + kStep) placeWall(place, left);
+  }
+}
+
+void Envelope::layMemory(const Input& input) {
+  const std::size_t known = std::min(remembered_, memory_.size());
+  for (std::size_t i = 0; i < known; ++i) {
+    const Remembered& wall = memory_[i];
+    const Beside place = beside(input.scan_pose.inverseTransform(wall.point), front_axle_);
+    if (place.s > stations_.front().s && place.s < stations_[front_axle_].s + kStep) {
+      placeWall(place, wall.left);
+    }
+  }
+}
+
+// Keeps where the walls began in this scan: the lidar at the nose will not see them again.
+void Envelope::remember(const Input& input) {
+  const Point here = input.scan_pose.position();
+  if (remembered_ > 0 && (here - last_remembered_at_).norm() < kMemoryStep) return;
+  last_remembered_at_ = here;
+  for (const bool left : {true, false}) {
+    const perception::Wall& wall = left ? input.walls.left : input.walls.right;
+    if (!wall.found || wall.curve.empty()) continue;
+    memory_[remembered_ % memory_.size()] = {input.scan_pose.transform(wall.curve.front()), left};
+    ++remembered_;
+  }
+}
+
+void Envelope::endFreeSpace(double s, End why) {
+  const double distance = std::max(0.0, s - geometry_.front_overhang);
+  if (distance >= result_.free_distance) return;
+  result_.free_distance = distance;
+  result_.free_until = why;
+}
+
+void Envelope::limitSight(const Input& input) {
+  if (input.profile.empty()) return endFreeSpace(wall_end_, End::kSight);
+  const Point front_axle = input.path_frame.inverseTransform(input.truck.position());
+  const double here = input.centerline.project(front_axle).s;
+  endFreeSpace(input.centerline.points().back().s - here, End::kSight);
+}
+
+void Envelope::compareWalls() {
+  double left = kInfinity;
+  double right = kInfinity;
+  for (const Station& station : stations_) {
+    if (!(station.left >= station.right)) continue;  // nothing passes
+    const double room_left = station.wall_left - station.left;
+    const double room_right = station.right - station.wall_right;
+    left = std::min(left, room_left);
+    right = std::min(right, room_right);
+    if (std::min(room_left, room_right) < parameters_.margin) endFreeSpace(station.s, End::kWall);
+  }
+  const auto known = [](double room) {
+    return room < kInfinity ? room : std::numeric_limits<double>::quiet_NaN();
+  };
+  result_.clearance_left = known(left);
+  result_.clearance_right = known(right);
+}
+
+// Returns inside the corridor count as an obstacle when enough of them stand beside each other, thinned to
+// one every smallest_obstacle / (obstacle_points + 1), so that lone dust does not stop the truck.
+void Envelope::findObstacles(const std::vector<Point>& points) {
+  const double apart = parameters_.smallest_obstacle / (parameters_.obstacle_points + 1);
+  const double together = parameters_.smallest_obstacle;
+  std::size_t near = front_axle_;
+  Point last(kInfinity, kInfinity);
+  Point last_inside(kInfinity, kInfinity);
+  int run = 0;
+  double run_s = kInfinity;
+  for (const Point& point : points) {
+    if (!((point - last).squaredNorm() >= apart * apart)) continue;  // also NaN
+    last = point;
+    const Beside place = beside(point, near);
+    near = place.station;
+    const Station& station = stations_[place.station];
+    const bool inside = place.s <= stations_.back().s + kStep &&
+                        place.lateral < station.left + parameters_.margin &&
+                        place.lateral > station.right - parameters_.margin;
+    if (!inside) continue;
+    const bool joined = (point - last_inside).squaredNorm() < together * together;
+    run = joined ? run + 1 : 1;
+    run_s = joined ? std::min(run_s, place.s) : place.s;
+    last_inside = point;
+    if (run >= parameters_.obstacle_points) endFreeSpace(run_s, End::kObstacle);
+  }
+}
+
+void Envelope::drawCorridor() {
+  result_.corridor_left.clear();
+  result_.corridor_right.clear();
+  for (const Station& station : stations_) {
+    if (!(station.left >= station.right)) continue;
+    const Point left = leftOf(station.direction);
+    result_.corridor_left.push_back(station.point + station.left * left);
+    result_.corridor_right.push_back(station.point + station.right * left);
+  }
+}
+
+}  // namespace tunnel_pilot::supervision
