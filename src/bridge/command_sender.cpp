@@ -1,0 +1,55 @@
+#include "tunnel_pilot/bridge/command_sender.h"
+
+#include <optional>
+
+#include "tunnel_pilot/can/protection.h"
+
+namespace tunnel_pilot::bridge {
+
+CommandSender::CommandSender(double period) : period_(fromSeconds(period)) {}
+
+void CommandSender::forgetTime() {
+  started_ = false;
+  sets_sent_ = 0;
+}
+
+bool CommandSender::due(bool stop, Stamp now) const {
+  return !started_ || now >= next_ || (stop && !stop_told_);
+}
+
+bool CommandSender::withinRate(Stamp now) const {
+  if (sets_sent_ < kMaxFrames) return true;
+  return now - sent_at_[sets_sent_ % kMaxFrames] > kWindow;  // the oldest of the ring
+}
+
+template <class Fields>
+bool CommandSender::sendOne(const Fields& fields, can::Bus& bus) {
+  const std::optional<can::Frame> frame = can::encode(fields);
+  if (!frame || !bus.send(*frame)) return false;
+  ++frames_sent_;
+  return true;
+}
+
+bool CommandSender::send(can::TruckCommandFrame command, can::CommandInfoFrame info,
+                         can::BridgeStatusFrame status, can::Bus& bus, Stamp now) {
+  if (!withinRate(now)) {
+    ++sets_blocked_;
+    return false;
+  }
+  // In step with the period, but after a gap nothing is made up for.
+  const bool in_step = started_ && now >= next_ && now < next_ + period_;
+  next_ = (in_step ? next_ : now) + period_;
+  started_ = true;
+  command.counter = info.counter = status.counter = counter_ = can::nextCounter(counter_);
+  sent_at_[sets_sent_++ % kMaxFrames] = now;
+  stop_told_ = command.stop;
+  if (sendOne(command, bus) && sendOne(info, bus) && sendOne(status, bus)) {
+    failed_in_row_ = 0;
+  } else {
+    ++failed_in_row_;
+    ++sets_failed_;
+  }
+  return true;
+}
+
+}  // namespace tunnel_pilot::bridge

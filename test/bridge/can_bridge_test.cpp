@@ -1,0 +1,406 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "rig.h"
+
+// The way up and down, commands, frames. What the watchdogs find: can_bridge_watch_test.cpp.
+namespace tunnel_pilot::bridge {
+namespace {
+
+using supervision::Command;
+using supervision::Reason;
+
+constexpr double kDeg = 3.14159265358979323846 / 180.0;
+
+class CanBridgeTest : public testing::Test {
+ protected:
+  void TearDown() override {
+    for (const std::string& complaint : rig.judge.complaints)
+      ADD_FAILURE() << "unsafe frame: " << complaint;
+  }
+  Rig rig;
+};
+
+TEST_F(CanBridgeTest, LeavesInitOnlyAfterOneSecondOfHealth) {
+  rig.run(0.98);
+  EXPECT_EQ(rig.state(), SafetyState::kInit);
+  rig.run(0.1);
+  EXPECT_EQ(rig.state(), SafetyState::kStandby);
+}
+
+TEST_F(CanBridgeTest, NeverEngagesByItself) {
+  rig.run(60.0);
+  EXPECT_EQ(rig.state(), SafetyState::kStandby);
+  EXPECT_EQ(rig.plant.state().speed, 0.0);
+}
+
+TEST_F(CanBridgeTest, RefusesToEngageBeforeOneSecondOfHealthAndSaysWhy) {
+  EXPECT_FALSE(rig.bridge->engage(rig.now).accepted);
+  rig.run(1.2);
+  rig.arbiter_alive = false;
+  rig.run(0.2);
+  EXPECT_EQ(rig.bridge->engage(rig.now).reason, "command stale");
+  rig.arbiter_alive = true;
+  rig.run(0.9);
+  EXPECT_EQ(rig.bridge->engage(rig.now).reason, "inputs not healthy for long enough");
+  rig.run(0.2);
+  EXPECT_TRUE(rig.bridge->engage(rig.now).accepted);
+  EXPECT_EQ(rig.bridge->engage(rig.now).reason, "already engaged");
+}
+
+TEST_F(CanBridgeTest, RefusesToEngageWhileTheArbiterSeesNoTunnel) {
+  rig.command.stop = true;
+  rig.command.reason = Reason::kTunnelInvalid;
+  rig.run(2.0);
+  EXPECT_EQ(rig.bridge->engage(rig.now).reason, "no valid tunnel");
+}
+
+TEST_F(CanBridgeTest, FirstFramesAfterEngagingAreNotIntendedToSteer) {
+  rig.run(1.5);
+  const std::size_t before = rig.judge.commands.size();
+  ASSERT_TRUE(rig.bridge->engage(rig.now).accepted);
+  rig.run(1.0, [&] { return rig.judge.last->steering_enable; });
+  EXPECT_GE(rig.judge.commands.size() - before, 5u);
+  EXPECT_EQ(rig.state(), SafetyState::kActive);
+}
+
+TEST_F(CanBridgeTest, ArmsInVainWhileTheArbiterHoldsItsStop) {
+  rig.command.stop = true;
+  rig.command.reason = Reason::kNotEngaged;
+  rig.run(1.5);
+  ASSERT_TRUE(rig.bridge->engage(rig.now).accepted);
+  rig.run(1.9);
+  EXPECT_EQ(rig.state(), SafetyState::kArmed);
+  rig.command.reason = Reason::kObstacle;
+  rig.run(0.2);
+  EXPECT_EQ(rig.state(), SafetyState::kStandby);
+  EXPECT_EQ(rig.reason(), Reason::kObstacle);
+}
+
+TEST_F(CanBridgeTest, DrivesTheTruckToTheCommandedSpeedAndArticulation) {
+  rig.drive(3.0);
+  rig.command.articulation_angle = 12.0 * kDeg;
+  rig.run(6.0);
+  EXPECT_EQ(rig.state(), SafetyState::kActive);
+  EXPECT_NEAR(rig.plant.state().speed, 3.0, 0.05);
+  EXPECT_NEAR(rig.plant.state().articulation, 12.0 * kDeg, 0.01 * kDeg);
+  EXPECT_TRUE(rig.bridge->status().autonomy_enabled);
+}
+
+TEST_F(CanBridgeTest, RepeatsTheLastCommandEveryTwentyMilliseconds) {
+  rig.drive();
+  const std::size_t before = rig.judge.times.size();
+  rig.run(1.0);
+  EXPECT_NEAR(static_cast<double>(rig.judge.times.size() - before), 50.0, 1.0);
+}
+
+TEST_F(CanBridgeTest, TellsTheMeasurementStampModulo65536Milliseconds) {
+  rig.drive();
+  rig.measurement = rig.now - ms(10);
+  rig.run(0.05);
+  const auto milliseconds =
+      std::chrono::duration_cast<std::chrono::milliseconds>(*rig.measurement).count();
+  EXPECT_EQ(rig.judge.last_info->measurement_stamp_ms, milliseconds % 65536);
+  EXPECT_EQ(rig.controller->measurementStamp(), rig.judge.last_info->measurement_stamp_ms);
+}
+
+TEST_F(CanBridgeTest, LimitsTheRateOfAStepInTheCommand) {
+  rig.drive();
+  rig.command.articulation_angle = 40.0 * kDeg;
+  const double start = rig.judge.last->articulation_angle;
+  rig.run(1.0);
+  EXPECT_NEAR(rig.judge.last->articulation_angle - start, 15.0 * kDeg, 0.5 * kDeg);
+  rig.run(3.0);
+  EXPECT_NEAR(rig.judge.last->articulation_angle, 40.0 * kDeg, 0.01 * kDeg);
+}
+
+TEST_F(CanBridgeTest, StartsToSteerFromTheMeasuredAngle) {
+  rig.plant.reset(geometry::Pose(), 20.0 * kDeg, 0.0);
+  rig.command.articulation_angle = -20.0 * kDeg;
+  rig.run(1.5);
+  ASSERT_TRUE(rig.bridge->engage(rig.now).accepted);
+  rig.run(1.0, [&] { return rig.judge.last->steering_enable; });
+  EXPECT_NEAR(rig.judge.last->articulation_angle, 20.0 * kDeg, 0.32 * kDeg);
+}
+
+TEST_F(CanBridgeTest, NeverSendsMoreThanSixteenFramesInAQuarterSecond) {
+  rig.run(1.5);
+  for (int i = 0; i < 500; ++i) {  // the judge counts
+    rig.command.stop = i % 2 == 0;
+    Command flapping = rig.command;
+    flapping.stamp = rig.now;
+    flapping.sequence = 1u << 20;
+    rig.bridge->setCommand(flapping, rig.now);
+    rig.run(0.001);
+  }
+}
+
+// ------------------------------------------------------------------------------------------------
+// commands
+
+class RefusedCommand : public CanBridgeTest,
+                       public testing::WithParamInterface<void (*)(Command&, Stamp)> {};
+
+TEST_P(RefusedCommand, IsCountedAndNeverSent) {
+  rig.drive();
+  const std::uint32_t before = rig.bridge->status().commands_rejected;
+  Command bad = rig.command;
+  bad.stamp = rig.now;
+  bad.sequence = 1u << 20;
+  GetParam()(bad, rig.now);
+  rig.bridge->setCommand(bad, rig.now);
+  rig.run(0.05);
+  EXPECT_EQ(rig.bridge->status().commands_rejected, before + 1);
+  EXPECT_LT(rig.judge.last_info->sequence, 1u << 20);
+  EXPECT_EQ(rig.state(), SafetyState::kActive) << "one bad command among good ones does no harm";
+}
+
+TEST_P(RefusedCommand, StopsThoughRefusedWhenItAsksForAStop) {
+  rig.drive();
+  Command bad = rig.command;
+  bad.stamp = rig.now;
+  bad.sequence = 1u << 20;
+  GetParam()(bad, rig.now);
+  bad.stop = true;
+  rig.judge.stopAsked(rig.now);
+  rig.bridge->setCommand(bad, rig.now);
+  EXPECT_EQ(rig.state(), SafetyState::kStopping);
+  rig.run(0.3);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, RefusedCommand,
+    testing::Values([](Command& c, Stamp) { c.articulation_angle = std::nan(""); },
+                    [](Command& c, Stamp) { c.speed = std::nan(""); },
+                    [](Command& c, Stamp) { c.acceleration = std::nan(""); },
+                    [](Command& c, Stamp) { c.speed = std::numeric_limits<double>::infinity(); },
+                    [](Command& c, Stamp) {
+                      c.articulation_angle = -std::numeric_limits<double>::infinity();
+                    },
+                    [](Command& c, Stamp) { c.articulation_angle = 45.1 * kDeg; },
+                    [](Command& c, Stamp) { c.articulation_angle = -45.1 * kDeg; },
+                    [](Command& c, Stamp) { c.speed = -0.1; }, [](Command& c, Stamp) { c.speed = 9.8; },
+                    [](Command& c, Stamp) { c.acceleration = -0.1; },
+                    [](Command& c, Stamp) { c.acceleration = 3.1; },
+                    [](Command& c, Stamp now) { c.stamp = now + ms(51); },
+                    [](Command& c, Stamp) { c.sequence = 0; }));
+
+TEST_F(CanBridgeTest, TakesAnArbiterThatStartedAgainOnlyWhenNotDriving) {
+  rig.drive();
+  rig.bridge->stop(rig.now);
+  rig.run(10.0, [&] { return rig.state() == SafetyState::kStopped; });
+  rig.arbiter_alive = false;
+  Command first = rig.command;
+  first.sequence = 0;
+  first.stamp = rig.now;
+  const std::uint32_t sent = rig.judge.last_info->sequence;
+  rig.bridge->setCommand(first, rig.now);
+  rig.run(0.05);
+  EXPECT_EQ(rig.judge.last_info->sequence, sent + 1) << "lifted above all before";
+}
+
+// ------------------------------------------------------------------------------------------------
+// stopping
+
+TEST_F(CanBridgeTest, OperatorsStopIsOnTheBusWithinTheCallInEveryState) {
+  for (const SafetyState wanted : {SafetyState::kInit, SafetyState::kStandby, SafetyState::kArmed,
+                                   SafetyState::kActive, SafetyState::kDegraded}) {
+    Rig other;
+    if (wanted == SafetyState::kInit) other.run(0.5);
+    if (wanted == SafetyState::kStandby) other.run(1.5);
+    if (wanted == SafetyState::kArmed) other.run(1.5), other.bridge->engage(other.now), other.run(0.03);
+    if (wanted >= SafetyState::kActive) other.drive();
+    if (wanted == SafetyState::kDegraded) other.measurement_age = ms(170), other.run(0.1);
+    ASSERT_EQ(other.state(), wanted);
+    other.bridge->stop(other.now);
+    const auto frame = other.wire_to_bridge->receive();  // before any tick
+    ASSERT_TRUE(frame) << toString(wanted);
+    EXPECT_TRUE(can::decode<can::TruckCommandFrame>(*frame)->stop);
+    EXPECT_TRUE(isStop(other.state()));
+  }
+}
+
+TEST_F(CanBridgeTest, ArbitersStopIsOnTheBusWithinTheCall) {
+  rig.drive();
+  Command stop = rig.command;
+  stop.stop = true;
+  stop.reason = Reason::kObstacle;
+  stop.stamp = rig.now;
+  stop.sequence = 1u << 20;
+  rig.bridge->setCommand(stop, rig.now);
+  EXPECT_TRUE(can::decode<can::TruckCommandFrame>(*rig.wire_to_bridge->receive())->stop);
+  EXPECT_EQ(rig.state(), SafetyState::kStopping);
+  EXPECT_EQ(rig.reason(), Reason::kObstacle);
+}
+
+TEST_F(CanBridgeTest, StopBrakesWhileItSteersAlongFreshCommands) {
+  rig.drive(5.0);
+  rig.command.stop = true;
+  rig.command.articulation_angle = 8.0 * kDeg;
+  rig.run(1.5);
+  EXPECT_EQ(rig.state(), SafetyState::kStopping);
+  EXPECT_NEAR(rig.plant.state().articulation, 8.0 * kDeg, 0.02 * kDeg);
+  EXPECT_LT(rig.plant.state().speed, 5.0 - 1.8 * 1.4);
+}
+
+TEST_F(CanBridgeTest, StopWithoutFreshCommandsHoldsTheMeasuredArticulation) {
+  rig.drive(5.0);
+  rig.command.articulation_angle = 40.0 * kDeg;  // far away: the hinge is on its way
+  rig.run(1.0);
+  rig.arbiter_alive = false;
+  rig.timeToStop();
+  const double held = rig.plant.state().articulation;
+  rig.run(1.5);
+  EXPECT_NEAR(rig.plant.state().articulation, held, 0.8 * kDeg);
+  EXPECT_EQ(rig.judge.last_info->source, static_cast<int>(supervision::Source::kHold));
+  EXPECT_TRUE(rig.judge.last->steering_enable);
+}
+
+TEST_F(CanBridgeTest, StoppedIsLatchedUntilAnOperatorsReset) {
+  rig.drive();
+  rig.bridge->stop(rig.now);
+  rig.run(10.0, [&] { return rig.state() == SafetyState::kStopped; });
+  ASSERT_EQ(rig.state(), SafetyState::kStopped);
+  EXPECT_EQ(rig.reason(), Reason::kOperatorStop);
+  rig.run(30.0);
+  EXPECT_EQ(rig.state(), SafetyState::kStopped);
+  EXPECT_FALSE(rig.bridge->engage(rig.now).accepted);
+  EXPECT_TRUE(rig.bridge->reset(rig.now).accepted);
+  EXPECT_EQ(rig.state(), SafetyState::kStandby);
+  rig.run(5.0);
+  EXPECT_EQ(rig.state(), SafetyState::kStandby);
+  EXPECT_TRUE(rig.bridge->engage(rig.now).accepted);
+  rig.run(10.0, [&] { return rig.plant.state().speed > 2.9; });
+  EXPECT_GT(rig.plant.state().speed, 2.9) << "drives again after reset and engage";
+}
+
+TEST_F(CanBridgeTest, ResetIsRefusedWhileStoppingAndUntilAllIsHealthyForOneSecond) {
+  rig.drive();
+  rig.arbiter_alive = false;
+  rig.timeToStop();
+  EXPECT_EQ(rig.bridge->reset(rig.now).reason, "still stopping");
+  rig.run(10.0, [&] { return rig.state() == SafetyState::kStopped; });
+  EXPECT_EQ(rig.bridge->reset(rig.now).reason, "command stale");
+  rig.arbiter_alive = true;
+  rig.run(0.9);
+  EXPECT_EQ(rig.bridge->reset(rig.now).reason, "inputs not healthy for long enough");
+  rig.run(0.2);
+  EXPECT_TRUE(rig.bridge->reset(rig.now).accepted);
+}
+
+TEST_F(CanBridgeTest, ReleaseWhileDrivingBrakesToAStop) {
+  rig.drive();
+  EXPECT_TRUE(rig.bridge->release(rig.now).accepted);
+  EXPECT_EQ(rig.state(), SafetyState::kStopping);
+  EXPECT_EQ(rig.reason(), Reason::kOperatorRelease);
+  rig.run(10.0);
+  EXPECT_EQ(rig.state(), SafetyState::kStopped);
+  EXPECT_EQ(rig.plant.state().speed, 0.0);
+  EXPECT_FALSE(rig.bridge->release(rig.now).accepted);
+}
+
+TEST_F(CanBridgeTest, StopsWithinTheTimeThatTheDecelerationAllows) {
+  rig.drive(5.0);
+  rig.judge.stopAsked(rig.now);
+  rig.bridge->stop(rig.now);
+  const Stamp start = rig.now;
+  rig.run(10.0, [&] { return rig.plant.state().speed < 0.01; });
+  EXPECT_NEAR(toSeconds(rig.now - start), 5.0 / 2.2, 0.2);
+}
+
+// ------------------------------------------------------------------------------------- random
+// interleavings
+
+// Any mixture of faults and requests: the judge finds no unsafe frame, and a stop stays a stop.
+TEST(CanBridgeRandom, NoUnsafeFrameInRandomInterleavings) {
+  constexpr int kRuns = 60;
+  int stops = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    std::mt19937 random(static_cast<unsigned>(run));
+    const auto dice = [&](int sides) {
+      return static_cast<int>(random() % static_cast<unsigned>(sides));
+    };
+    Rig rig(0.001 * (1 + dice(20)));
+    int corrupt = 0;
+    rig.to_bridge = [&](can::Frame frame) {
+      if (corrupt > 0 && dice(3) == 0) frame.data[static_cast<std::size_t>(dice(8))] ^= 0x10, --corrupt;
+      return std::optional<can::Frame>(frame);
+    };
+    for (int i = 0; i < 60; ++i) {
+      const SafetyState before = rig.state();
+      rig.arbiter_alive = dice(12) != 0;
+      rig.truck_alive = dice(12) != 0;
+      rig.measurement_age = ms(dice(10) == 0 ? dice(400) : 60);
+      rig.command.articulation_angle = (dice(80) - 40) * kDeg;
+      rig.command.speed = dice(9);
+      rig.command.stop = dice(25) == 0;
+      rig.cab.brake = dice(40) == 0 ? 0.5 : 0.0;
+      rig.cab.key = dice(30) == 0 ? can::OperatorKey::kManual : can::OperatorKey::kAutonomous;
+      corrupt = dice(10) == 0 ? dice(6) : 0;
+      const int edge = dice(8);
+      if (edge == 0) rig.bridge->stop(rig.now), ++stops;
+      if (edge == 1) rig.bridge->reset(rig.now);
+      if (edge >= 2 && edge <= 5) rig.bridge->engage(rig.now);
+      rig.pump();
+      const bool must_stand = edge == 0 || (edge == 1 && before == SafetyState::kStopping);
+      EXPECT_TRUE(!must_stand || isStop(rig.state()));
+      rig.run(dice(4) == 0 ? 1.5 : 0.05 * dice(10));
+    }
+    for (const std::string& complaint : rig.judge.complaints)
+      ADD_FAILURE() << "run " << run << ": " << complaint;
+  }
+  EXPECT_GT(stops, 100);
+}
+
+// RELIABILITY A2: after a stop request no frame but stop frames, the first within 20 ms, whatever
+// happens.
+TEST(CanBridgeRandom, EveryStopRequestIsOnTheBusWithinTwentyMilliseconds) {
+  Stamp worst{};
+  std::mt19937 random(42);
+  Rig rig(0.02);
+  rig.drive();
+  for (int i = 0; i < 400; ++i) {
+    rig.run(0.001 * (random() % 40));
+    const Stamp asked = rig.now;
+    const std::size_t before = rig.judge.times.size();
+    rig.bridge->stop(rig.now);
+    rig.pump();
+    rig.run(0.04);
+    ASSERT_GT(rig.judge.times.size(), before);
+    EXPECT_TRUE(rig.judge.commands[before].stop);
+    worst = std::max(worst, rig.judge.times[before] - asked);
+    rig.run(5.0, [&] { return rig.state() == SafetyState::kStopped; });
+    rig.run(0.02);
+    ASSERT_TRUE(rig.bridge->reset(rig.now).accepted);
+    rig.bridge->engage(rig.now);
+    rig.run(0.15);
+  }
+  EXPECT_LE(worst, ms(20));
+  std::printf("stop request to stop bit on the bus: worst %.1f ms\n", toSeconds(worst) * 1e3);
+}
+
+TEST(CanBridgeRandom, SameRunGivesTheSameBytesOnTheBus) {
+  const auto once = [] {
+    Rig rig;
+    rig.drive();
+    rig.command.articulation_angle = 0.1;
+    rig.run(2.0);
+    rig.arbiter_alive = false;
+    rig.run(3.0);
+    std::string bytes;
+    for (const can::Frame& frame : rig.log) {
+      bytes += std::to_string(frame.id);
+      bytes.append(frame.data.begin(), frame.data.end());
+    }
+    return bytes;
+  };
+  const std::string first = once();
+  EXPECT_GT(first.size(), 10000u);
+  EXPECT_EQ(first, once());
+}
+
+}  // namespace
+}  // namespace tunnel_pilot::bridge

@@ -1,0 +1,265 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+
+#include "rig.h"
+
+// Every watchdog: what it finds, how fast in virtual time, and what it leaves alone.
+namespace tunnel_pilot::bridge {
+namespace {
+
+using supervision::Reason;
+
+constexpr double kDeg = 3.14159265358979323846 / 180.0;
+
+// All latencies are looked for with ticks of 1 ms and of 20 ms, the slowest that is allowed.
+class Watchdog : public testing::TestWithParam<double> {
+ protected:
+  Watchdog() : rig(GetParam()) {}
+  void TearDown() override {
+    for (const std::string& complaint : rig.judge.complaints)
+      ADD_FAILURE() << "unsafe frame: " << complaint;
+  }
+
+  /// Expects STOPPING for `reason`, later than `from` and not later than `limit` and a tick [s].
+  void expectStop(Reason reason, double from, double limit) {
+    const double time = rig.timeToStop();
+    EXPECT_EQ(rig.reason(), reason) << supervision::toString(rig.reason());
+    EXPECT_GT(time, from);
+    EXPECT_LE(time, limit + GetParam() + 0.0011);
+    RecordProperty("latency_ms", std::to_string(1e3 * time));
+    std::printf("  tick %2.0f ms: %-45s %6.1f ms\n", 1e3 * GetParam(),
+                supervision::toString(reason).c_str(), 1e3 * time);
+    rig.run(15.0);
+    EXPECT_EQ(rig.state(), SafetyState::kStopped) << "latched";
+  }
+  Rig rig;
+};
+INSTANTIATE_TEST_SUITE_P(Ticks, Watchdog, testing::Values(0.001, 0.020));
+
+TEST_P(Watchdog, CommandStale) {
+  rig.drive();
+  rig.run(0.02, [&] { return rig.bridge->status().command_age < 0.001; });
+  rig.arbiter_alive = false;
+  expectStop(Reason::kCommandStale, 0.079, 0.101);
+}
+
+TEST_P(Watchdog, MeasurementStale) {
+  rig.drive();
+  rig.measurement = rig.now;  // from here on the commands stem from one old scan
+  rig.run(0.2);
+  EXPECT_EQ(rig.state(), SafetyState::kDegraded);
+  expectStop(Reason::kSourceStale, 0.09, 0.3 - 0.2);
+}
+
+TEST_P(Watchdog, FeedbackLost) {
+  rig.drive();
+  rig.truck_alive = false;
+  expectStop(Reason::kFeedbackStale, 0.02, 0.061);
+}
+
+TEST_P(Watchdog, EachOfTheThreeFramesLostAloneStops) {
+  for (const std::uint32_t lost : {can::kTruckFeedbackId, can::kTruckMotionId, can::kTruckStatusId}) {
+    Rig other(GetParam());
+    other.drive();
+    other.to_bridge = [lost](const can::Frame& f) {
+      return f.id == lost ? std::nullopt : std::optional<can::Frame>(f);
+    };
+    EXPECT_LE(other.timeToStop(), 0.062 + GetParam());
+    EXPECT_EQ(other.reason(), Reason::kFeedbackStale);
+  }
+}
+
+TEST_P(Watchdog, ThreeCorruptFramesInTen) {
+  rig.drive();
+  int count = 0;
+  rig.to_bridge = [&](can::Frame f) {
+    if (f.id == can::kTruckFeedbackId && ++count % 3 == 1) f.data[4] ^= 1;
+    return std::optional<can::Frame>(f);
+  };
+  expectStop(Reason::kFeedbackCorrupt, 0.1, 0.161);  // frames 1, 4 and 7: 140 ms
+}
+
+TEST_P(Watchdog, ReplayedFrames) {
+  rig.drive();
+  std::map<std::uint32_t, can::Frame> first;
+  rig.to_bridge = [&](const can::Frame& f) {
+    return std::optional<can::Frame>(first.emplace(f.id, f).first->second);
+  };
+  expectStop(Reason::kFeedbackCorrupt, 0.038, 0.061);  // three repeats
+}
+
+TEST_P(Watchdog, ForeignSenderOfOurIdentifier) {
+  rig.drive();
+  can::Frame foreign = *can::encode(can::TruckCommandFrame());
+  foreign.length = 3;  // any length, any bytes
+  rig.wire_to_bridge->send(foreign);
+  expectStop(Reason::kBusFault, 0.0, 0.0);
+}
+
+TEST_P(Watchdog, OperatorOverrideEndsSteeringAndNeverReturns) {
+  rig.drive();
+  rig.cab.steering_wheel = 6.0 * kDeg;
+  const Stamp start = rig.now;
+  rig.run(0.5, [&] { return !rig.judge.last->steering_enable; });
+  EXPECT_LE(rig.now - start, ms(22) + fromSeconds(GetParam()));
+  EXPECT_EQ(rig.reason(), Reason::kOperatorOverride);
+  rig.cab.steering_wheel = 0.0;
+  rig.run(20.0);
+  EXPECT_TRUE(isStop(rig.state()));
+  EXPECT_FALSE(rig.bridge->reset(rig.now).accepted) << "the key must be turned first";
+}
+
+TEST_P(Watchdog, KeyTurnedToManual) {
+  rig.drive();
+  rig.cab.key = can::OperatorKey::kManual;
+  expectStop(Reason::kOperatorRelease, 0.0, 0.022);
+}
+
+TEST_P(Watchdog, TruckFault) {
+  rig.drive();
+  rig.controller->setFaults(can::kFaultBrake);
+  expectStop(Reason::kTruckFault, 0.0, 0.022);
+  EXPECT_EQ(rig.bridge->status().faults & can::kFaultBrake, can::kFaultBrake);
+}
+
+TEST_P(Watchdog, TruckThatDoesNotObey) {
+  rig.to_truck = [](can::Frame f) { return std::optional<can::Frame>(f); };
+  rig.to_bridge = [](can::Frame f) {
+    auto feedback = can::decode<can::TruckFeedbackFrame>(f);
+    if (!feedback) return std::optional<can::Frame>(f);
+    feedback->autonomy_enabled = false;
+    return can::encode(*feedback);
+  };
+  rig.run(1.5);
+  ASSERT_TRUE(rig.bridge->engage(rig.now).accepted);
+  rig.run(1.0, [&] { return rig.state() == SafetyState::kActive; });
+  expectStop(Reason::kTruckFault, 0.49, 0.501);
+}
+
+TEST_P(Watchdog, BusDown) {
+  rig.drive();
+  rig.bridge_side.setState(can::BusState::kDown);
+  const double time = rig.timeToStop();
+  EXPECT_EQ(rig.reason(), Reason::kBusFault);
+  EXPECT_LE(time, GetParam() + 0.0011);
+  rig.run(0.5);
+  EXPECT_LT(rig.plant.state().speed, 2.5) << "the truck's own timeout brakes";
+}
+
+TEST_P(Watchdog, StuckValve) {
+  rig.drive();
+  rig.valve_stuck = true;
+  rig.command.articulation_angle = 15.0 * kDeg;
+  // At 9 deg/s, after dead time and lag, 5 degrees are expected 0.90 s after the step, and then 0.5 s
+  // more.
+  expectStop(Reason::kTrackingError, 1.3, 1.45);
+}
+
+TEST_P(Watchdog, HealthyFullLockRampsAreNoTrackingError) {
+  rig.drive(2.0);
+  for (const double angle : {40.0, -40.0, 40.0}) {
+    rig.command.articulation_angle = angle * kDeg;
+    rig.run(6.5);
+  }
+  EXPECT_EQ(rig.state(), SafetyState::kActive);
+}
+
+TEST_P(Watchdog, ClockThatJumpsBack) {
+  rig.drive();
+  Stamp jumped = rig.now - fromSeconds(5.0);
+  rig.bridge->tick(jumped);
+  EXPECT_EQ(rig.state(), SafetyState::kStopping);
+  EXPECT_EQ(rig.reason(), Reason::kClockJump);
+  EXPECT_FALSE(rig.bridge->motionFresh(jumped));
+}
+
+TEST_P(Watchdog, ClockThatJumpsDisarmsBeforeDriving) {
+  rig.run(1.5);
+  ASSERT_TRUE(rig.bridge->engage(rig.now).accepted);
+  rig.bridge->clockJumped(rig.now + fromSeconds(100.0));
+  EXPECT_EQ(rig.state(), SafetyState::kInit);
+}
+
+TEST_P(Watchdog, HealthyDriveOfTenMinutesNeverStops) {
+  rig.drive();
+  for (int i = 0; i < 600; ++i) {
+    rig.command.articulation_angle = 10.0 * kDeg * std::sin(0.3 * i);
+    rig.run(1.0);
+  }
+  EXPECT_EQ(rig.state(), SafetyState::kActive);
+  EXPECT_EQ(rig.bridge->status().frames_rejected, 0u);
+  EXPECT_EQ(rig.controller->framesRejected(), 0u);
+}
+
+// --------------------------------------------------------------------------------------------------
+// DEGRADED
+
+TEST_P(Watchdog, LateMeasurementDegradesAndOneSecondOfHealthRecovers) {
+  rig.drive();
+  rig.measurement_age = ms(160);
+  rig.run(0.1);
+  EXPECT_EQ(rig.state(), SafetyState::kDegraded);
+  rig.run(3.0);
+  EXPECT_LT(rig.plant.state().speed, 1.55);
+  rig.measurement_age = ms(60);
+  rig.run(0.95);
+  EXPECT_EQ(rig.state(), SafetyState::kDegraded);
+  rig.run(0.15);
+  EXPECT_EQ(rig.state(), SafetyState::kActive);
+}
+
+TEST_P(Watchdog, ArbitersReasonDegrades) {
+  rig.drive();
+  rig.command.reason = Reason::kScanStale;
+  rig.run(0.05);
+  EXPECT_EQ(rig.state(), SafetyState::kDegraded);
+  EXPECT_EQ(rig.reason(), Reason::kScanStale);
+}
+
+TEST_P(Watchdog, SlowingForAnObstacleIsNoDegradation) {
+  rig.drive();
+  rig.command.reason = Reason::kObstacle;
+  rig.run(0.5);
+  EXPECT_EQ(rig.state(), SafetyState::kActive);
+}
+
+// --------------------------------------------------------------------------------------- what is left
+// alone
+
+TEST_P(Watchdog, OneLostAndOneCorruptFrameInTenDoNoHarm) {
+  rig.drive();
+  int count = 0;
+  rig.to_bridge = [&](can::Frame f) {
+    if (f.id != can::kTruckFeedbackId) return std::optional<can::Frame>(f);
+    ++count;
+    if (count % 10 == 3) return std::optional<can::Frame>();
+    if (count % 10 == 8) f.data[1] ^= 0x80;
+    return std::optional<can::Frame>(f);
+  };
+  rig.run(20.0);
+  EXPECT_EQ(rig.state(), SafetyState::kActive);
+  EXPECT_GT(rig.bridge->status().frames_rejected, 90u);
+}
+
+TEST_P(Watchdog, StrangersIdentifiersAreDiscardedAndCounted) {
+  rig.drive();
+  const std::uint32_t before = rig.bridge->status().frames_rejected;
+  std::uint32_t sent = 0;
+  for (std::uint32_t id = 0; id < 2048; ++id) {
+    const bool known = can::findLayout(id) != nullptr;
+    can::Frame frame;
+    frame.id = id;
+    frame.length = 8;
+    frame.extended = known;  // a 29-bit frame of the same number is a stranger, too
+    rig.wire_to_bridge->send(frame), ++sent;
+    if (id % 8 == 7) rig.run(0.02);
+  }
+  rig.run(0.05);
+  EXPECT_EQ(rig.state(), SafetyState::kActive);
+  EXPECT_EQ(rig.bridge->status().frames_rejected, before + sent);
+}
+
+}  // namespace
+}  // namespace tunnel_pilot::bridge
