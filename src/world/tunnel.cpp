@@ -1,0 +1,174 @@
+#include "tunnel.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+namespace tunnel_pilot::world {
+namespace {
+
+using geometry::Path;
+using geometry::PathPoint;
+using geometry::Point;
+
+constexpr double kFoldLimit = 0.9;       // curvature times wall offset; at 1 the inner wall would be a point
+constexpr double kCornerSmoothing = 1.0;  // roughness fades out towards an opening's corners [m]
+
+Point normalOf(const PathPoint& p) { return {-std::sin(p.heading), std::cos(p.heading)}; }
+Point positionOf(const PathPoint& p) { return {p.x, p.y}; }
+
+// Wall vertices with the arc length that each belongs to.
+struct TaggedChain {
+  WallChain points;
+  std::vector<double> s;
+
+  void add(const Point& point, double at) {
+    points.push_back(point);
+    s.push_back(at);
+  }
+};
+
+class WallBuilder {
+ public:
+  explicit WallBuilder(const TunnelPlan& plan)
+      : plan_(plan), line_(geometry::buildPath(plan.pieces, {}, plan.wall_spacing, plan.closed)) {
+    for (const PathPoint& p : line_.points()) s_.push_back(p.s);
+    if (plan.closed) s_.pop_back();  // it is the first again
+  }
+
+  TunnelWalls build() {
+    TunnelWalls walls;
+    for (const bool left : {true, false}) {
+      TaggedChain chain = wall(left);
+      if (walls.conflict.empty()) walls.conflict = conflictOf(chain);
+      walls.chains.push_back(std::move(chain.points));
+    }
+    const std::string fold = foldOf();
+    if (!fold.empty()) walls.conflict = fold;
+    return walls;
+  }
+
+ private:
+  double halfWidth(double s) const {
+    double width = plan_.width;
+    for (const Widening& w : plan_.widenings) {
+      if (s <= w.from || s >= w.to) continue;
+      const double share = std::min({1.0, (s - w.from) / w.taper, (w.to - s) / w.taper});
+      width += share * (w.width - plan_.width);
+    }
+    return 0.5 * width;
+  }
+
+  // How far from the line the excavation reaches at `s`, on the wider side.
+  double reach(double s) const {
+    double depth = 0.0;
+    for (const Opening& o : plan_.openings) {
+      if (std::abs(s - o.at) <= 0.5 * o.width) depth = std::max(depth, o.depth);
+    }
+    return halfWidth(s) + depth;
+  }
+
+  TaggedChain wall(bool left) const {
+    const double side = left ? 1.0 : -1.0;
+    Draws draws(plan_.seed, left ? 1 : 2);
+    const std::vector<double> rough =
+        roughnessAlong(s_, line_.length(), plan_.closed, plan_.roughness, draws);
+    std::vector<Opening> openings;
+    for (const Opening& o : plan_.openings) {
+      if (o.left == left) openings.push_back(o);
+    }
+    std::sort(openings.begin(), openings.end(),
+              [](const Opening& a, const Opening& b) { return a.at < b.at; });
+    TaggedChain chain;
+    auto next = openings.begin();
+    for (std::size_t i = 0; i < s_.size(); ++i) {
+      for (; next != openings.end() && s_[i] >= next->at - 0.5 * next->width; ++next) {
+        addOpening(*next, side, draws, chain);
+      }
+      const bool inside = next != openings.begin() &&
+                          s_[i] <= std::prev(next)->at + 0.5 * std::prev(next)->width;
+      if (inside) continue;
+      const PathPoint& p = line_.points()[i];
+      chain.add(positionOf(p) + side * (halfWidth(p.s) + rough[i]) * normalOf(p), p.s);
+    }
+    if (plan_.closed) chain.add(chain.points.front(), chain.s.front());
+    return chain;
+  }
+
+  // The wall's way round a recess: out, along the face, back.
+  void addOpening(const Opening& o, double side, Draws& draws, TaggedChain& chain) const {
+    const PathPoint middle = line_.at(o.at);
+    const Point outward = side * normalOf(middle);
+    const Point along(std::cos(middle.heading), std::sin(middle.heading));
+    const double wall = halfWidth(o.at);
+    const Point mouth = positionOf(middle) + wall * outward - 0.5 * o.width * along;
+    const double perimeter = 2.0 * o.depth + o.width;
+    const auto steps = std::max(6, static_cast<int>(std::ceil(perimeter / plan_.wall_spacing)));
+    std::vector<double> way;
+    for (const auto& [from, to] : {std::pair(0.0, o.depth), std::pair(o.depth, o.depth + o.width),
+                                   std::pair(o.depth + o.width, perimeter)}) {
+      const int part = std::max(1, static_cast<int>(std::lround(steps * (to - from) / perimeter)));
+      for (int k = from == 0.0 ? 0 : 1; k <= part; ++k) way.push_back(from + (to - from) * k / part);
+    }
+    const std::vector<double> rough = roughnessAlong(way, perimeter, false, plan_.roughness, draws);
+    for (std::size_t i = 0; i < way.size(); ++i) {
+      const double u = way[i];
+      const double corner = std::min({u, std::abs(u - o.depth), std::abs(u - o.depth - o.width),
+                                      perimeter - u});
+      const double offset = rough[i] * std::min(1.0, corner / kCornerSmoothing);
+      Point p = mouth;
+      if (u <= o.depth) {
+        p += u * outward - offset * along;
+      } else if (u <= o.depth + o.width) {
+        p += (o.depth + offset) * outward + (u - o.depth) * along;
+      } else {
+        p += (perimeter - u) * outward + (o.width + offset) * along;
+      }
+      chain.add(p, o.at);
+    }
+  }
+
+  // The inner wall of a bend runs backwards where the line's radius is less than the wall's offset.
+  std::string foldOf() const {
+    for (const PathPoint& p : line_.points()) {
+      if (std::abs(p.curvature) * halfWidth(p.s) <= kFoldLimit) continue;
+      std::ostringstream out;
+      out << "folds its inner wall at s = " << p.s << " m: the radius of " << 1.0 / std::abs(p.curvature)
+          << " m must exceed the half width of " << halfWidth(p.s) << " m";
+      return out.str();
+    }
+    return "";
+  }
+
+  // Where the chain comes nearer to another part of the line than that part's own wall and the rock between.
+  std::string conflictOf(const TaggedChain& chain) const {
+    double widest = 0.0;
+    for (const double s : s_) widest = std::max(widest, halfWidth(s));
+    const double neighbourhood = M_PI * (widest + plan_.separation);
+    std::vector<double> apart(s_.size());
+    for (std::size_t k = 0; k < s_.size(); ++k) apart[k] = reach(s_[k]) + plan_.separation;
+    for (std::size_t i = 0; i < chain.points.size(); ++i) {
+      for (std::size_t k = 0; k < s_.size(); ++k) {
+        double gap = std::abs(chain.s[i] - s_[k]);
+        if (plan_.closed) gap = std::min(gap, line_.length() - gap);
+        if (gap <= neighbourhood) continue;
+        if ((positionOf(line_.points()[k]) - chain.points[i]).norm() >= apart[k]) continue;
+        std::ostringstream out;
+        out << "brings the wall at s = " << chain.s[i] << " m within " << plan_.separation
+            << " m of the part at s = " << s_[k] << " m";
+        return out.str();
+      }
+    }
+    return "";
+  }
+
+  const TunnelPlan& plan_;
+  Path line_;
+  std::vector<double> s_;
+};
+
+}  // namespace
+
+TunnelWalls buildWalls(const TunnelPlan& plan) { return WallBuilder(plan).build(); }
+
+}  // namespace tunnel_pilot::world
