@@ -38,13 +38,15 @@ class WallBuilder {
 
   TunnelWalls build() {
     TunnelWalls walls;
+    TaggedChain all;
     for (const bool left : {true, false}) {
       TaggedChain chain = wall(left);
-      if (walls.conflict.empty()) walls.conflict = conflictOf(chain);
+      all.points.insert(all.points.end(), chain.points.begin(), chain.points.end());
+      all.s.insert(all.s.end(), chain.s.begin(), chain.s.end());
       walls.chains.push_back(std::move(chain.points));
     }
-    const std::string fold = foldOf();
-    if (!fold.empty()) walls.conflict = fold;
+    walls.conflict = foldOf();
+    if (walls.conflict.empty()) walls.conflict = conflictOf(all);
     return walls;
   }
 
@@ -57,15 +59,6 @@ class WallBuilder {
       width += share * (w.width - plan_.width);
     }
     return 0.5 * width;
-  }
-
-  // How far from the line the excavation reaches at `s`, on the wider side.
-  double reach(double s) const {
-    double depth = 0.0;
-    for (const Opening& o : plan_.openings) {
-      if (std::abs(s - o.at) <= 0.5 * o.width) depth = std::max(depth, o.depth);
-    }
-    return halfWidth(s) + depth;
   }
 
   TaggedChain wall(bool left) const {
@@ -140,22 +133,22 @@ class WallBuilder {
     return "";
   }
 
-  // Where the chain comes nearer to another part of the line than that part's own wall and the rock between.
-  std::string conflictOf(const TaggedChain& chain) const {
+  // Where walls that are far apart along the line come near to each other. Neighbours along the line are
+  // left out: there the opposite wall and an opening's corners are near by right.
+  std::string conflictOf(const TaggedChain& all) const {
     double widest = 0.0;
     for (const double s : s_) widest = std::max(widest, halfWidth(s));
     const double neighbourhood = M_PI * (widest + plan_.separation);
-    std::vector<double> apart(s_.size());
-    for (std::size_t k = 0; k < s_.size(); ++k) apart[k] = reach(s_[k]) + plan_.separation;
-    for (std::size_t i = 0; i < chain.points.size(); ++i) {
-      for (std::size_t k = 0; k < s_.size(); ++k) {
-        double gap = std::abs(chain.s[i] - s_[k]);
+    const double apart = std::max(plan_.separation, plan_.wall_spacing);  // crossing walls are within it
+    for (std::size_t i = 0; i < all.points.size(); ++i) {
+      for (std::size_t k = 0; k < i; ++k) {
+        if ((all.points[i] - all.points[k]).squaredNorm() >= apart * apart) continue;
+        double gap = std::abs(all.s[i] - all.s[k]);
         if (plan_.closed) gap = std::min(gap, line_.length() - gap);
         if (gap <= neighbourhood) continue;
-        if ((positionOf(line_.points()[k]) - chain.points[i]).norm() >= apart[k]) continue;
         std::ostringstream out;
-        out << "brings the wall at s = " << chain.s[i] << " m within " << plan_.separation
-            << " m of the part at s = " << s_[k] << " m";
+        out << "brings the walls at s = " << all.s[k] << " m and s = " << all.s[i] << " m within " << apart
+            << " m of each other";
         return out.str();
       }
     }
