@@ -79,6 +79,20 @@ TEST(TruckFile, EveryNumberIsRequiredAndRefusedOutOfRange) {
   EXPECT_GT(numbers, 50);
 }
 
+// roslaunch reads the file with Python's YAML 1.1, for which 1e6 without a sign and a point is text.
+TEST(TruckFile, NumbersMeanTheSameToPython) {
+  for (const auto& section : YAML::LoadFile(truckFile())) {
+    if (!section.second.IsMap()) continue;
+    for (const auto& entry : section.second) {
+      const std::string value = entry.second.Scalar();
+      const std::size_t e = value.find('e');
+      EXPECT_NE(value.find('.'), std::string::npos) << entry.first.Scalar();
+      if (e == std::string::npos) continue;
+      EXPECT_NE(std::string("+-").find(value.at(e + 1)), std::string::npos) << entry.first.Scalar();
+    }
+  }
+}
+
 TEST(TruckFile, IdleCannotSteerFasterThanWorkingSpeed) {
   EXPECT_NE(refusal([](YAML::Node& y) { y["steering"]["idle_rate"] = 0.3; }).find("steering.idle_rate"),
             std::string::npos);
