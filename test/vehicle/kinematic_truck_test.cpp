@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "truck_file.h"
 #include "tunnel_pilot/vehicle/articulation.h"
@@ -36,6 +38,7 @@ double largestRearSlip(const TruckParameters& parameters) {
 TEST(KinematicTruck, RearAxleDoesNotSlip) {
   EXPECT_LT(largestRearSlip(shippedTruck()), 1e-9);
   EXPECT_LT(largestRearSlip(symmetricTruck()), 1e-9);
+  RecordProperty("largest_slip_m_s", std::to_string(largestRearSlip(shippedTruck()) * 1e15) + "e-15");
 }
 
 // The same measure, put to the paper's equation 1 (l_f where equation 2 has l_r), sees its error of

@@ -24,14 +24,14 @@ std::string read(const std::string& file) {
   return text.str();
 }
 
-struct Run {
+struct Outcome {
   int status;
   std::string output;  // both streams
 };
 
-Run run(const std::string& command) {
+Outcome run(const std::string& command) {
   FILE* pipe = popen((command + " 2>&1").c_str(), "r");
-  Run result{-1, ""};
+  Outcome result{-1, ""};
   if (pipe == nullptr) return result;
   std::array<char, 4096> buffer;
   while (std::size_t n = fread(buffer.data(), 1, buffer.size(), pipe))
@@ -40,7 +40,7 @@ Run run(const std::string& command) {
   return result;
 }
 
-Run generate(const std::string& truck) {
+Outcome generate(const std::string& truck) {
   return run("/usr/bin/python3 '" + kSource + "/scripts/generate_urdf' --output - --truck '" + truck +
              "'");
 }
@@ -57,20 +57,20 @@ std::string changedTruck(const std::string& from, const std::string& to) {
 }
 
 TEST(Urdf, CommittedFileIsWhatTheTruckFileGives) {
-  const Run generated = generate(truckFile());
+  const Outcome generated = generate(truckFile());
   ASSERT_EQ(generated.status, 0) << generated.output;
   EXPECT_TRUE(generated.output == read(kUrdf)) << "run scripts/generate_urdf and commit " << kUrdf;
 }
 
 TEST(Urdf, FollowsTheTruckFile) {
-  const Run generated = generate(changedTruck("front_axle_to_hinge: 1.95", "front_axle_to_hinge: 2.05"));
+  const Outcome generated = generate(changedTruck("front_axle_to_hinge: 1.95", "front_axle_to_hinge: 2.05"));
   EXPECT_EQ(generated.status, 0);
   EXPECT_NE(generated.output, read(kUrdf));
   EXPECT_NE(generated.output.find("<origin xyz=\"-2.05 0 0\""), std::string::npos);
 }
 
 TEST(Urdf, TruckFileWithoutAKeyIsRefusedByName) {
-  const Run generated = generate(changedTruck("  track: 2.278", "  trick: 2.278"));
+  const Outcome generated = generate(changedTruck("  track: 2.278", "  trick: 2.278"));
   EXPECT_EQ(generated.status, 1);
   EXPECT_NE(generated.output.find("changed_truck.yaml: no truck file: KeyError: 'track'"),
             std::string::npos)
@@ -103,7 +103,7 @@ TEST(Urdf, IsAcceptedByTheUrdfParser) {
   if (run("command -v check_urdf").status != 0) {
     GTEST_SKIP() << "check_urdf (package liburdfdom-tools) is not installed";
   }
-  const Run check = run("check_urdf '" + kUrdf + "'");
+  const Outcome check = run("check_urdf '" + kUrdf + "'");
   EXPECT_EQ(check.status, 0) << check.output;
   EXPECT_NE(check.output.find("root Link: base_link"), std::string::npos) << check.output;
 }
