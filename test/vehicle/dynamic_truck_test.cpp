@@ -22,6 +22,63 @@ double cruise(const DynamicTruck& truck, double speed) {
   return 0.2 + 2.0 * (speed - truck.state().speed);
 }
 
+// Momentum of the truck, from its masses and two reported states a step apart: independent of the
+// equations of motion.
+struct Momentum {
+  geometry::Point velocity;  // of the common centre of gravity [m/s]
+  double spin;               // angular momentum about it [kg m^2/s]
+};
+
+Momentum momentum(const TruckParameters& truck, const PlantState& before, const PlantState& after) {
+  const TruckMasses& m = truck.loaded;
+  const double m_all = m.front + m.rear;
+  const auto front = [&](const PlantState& s) {
+    return s.pose.transform({m.front_cg_offset - truck.geometry.front_axle_to_hinge, 0.0});
+  };
+  const auto rear = [&](const PlantState& s) {
+    return rearPose(truck.geometry, s.pose, s.articulation)
+        .transform({truck.geometry.rear_axle_to_hinge - m.rear_cg_offset, 0.0});
+  };
+  const geometry::Point front_v = (front(after) - front(before)) / kStep;
+  const geometry::Point rear_v = (rear(after) - rear(before)) / kStep;
+  const geometry::Point v = (m.front * front_v + m.rear * rear_v) / m_all;
+  const geometry::Point arm = front(after) - rear(after);
+  const geometry::Point apart = front_v - rear_v;
+  const double orbit = m.front * m.rear / m_all * (arm.x() * apart.y() - arm.y() * apart.x());
+  return {v, orbit + m.front_inertia * after.yaw_rate +
+                 m.rear_inertia * (after.yaw_rate - after.articulation_rate)};
+}
+
+// Sliding without any grip, nothing but the hinge acts, whatever the cylinders do.
+TEST(DynamicTruck, SlidingOnIceKeepsItsMomentum) {
+  const TruckParameters parameters = shippedTruck();
+  DynamicTruck truck(parameters, onPlane());
+  truck.reset({}, 0.5, 4.0);
+  PlantState before = truck.state();
+  truck.step({0.5, 0.0}, {0.0, 0.0}, kStep);
+  const Momentum start = momentum(parameters, before, truck.state());
+  for (int i = 0; i < 5000; ++i) {
+    before = truck.state();
+    truck.step({i < 2000 ? -0.5 : 0.5, 0.0}, {0.0, 0.0}, kStep);
+    const Momentum now = momentum(parameters, before, truck.state());
+    ASSERT_LT((now.velocity - start.velocity).norm(), 2e-3) << i;
+    ASSERT_NEAR(now.spin, start.spin, 2e-3 * std::abs(start.spin)) << i;
+  }
+}
+
+TEST(DynamicTruck, GravityOnAGradePullsButDoesNotSpin) {
+  const TruckParameters parameters = shippedTruck();
+  DynamicTruck truck(parameters, onPlane());
+  truck.reset({}, 0.5, 0.0);
+  for (int i = 0; i < 2000; ++i) {
+    const PlantState before = truck.state();
+    truck.step({0.5, 0.0}, {-0.15, 0.0}, kStep);
+    const Momentum now = momentum(parameters, before, truck.state());
+    ASSERT_NEAR(now.spin, 0.0, 20.0) << i;
+    ASSERT_NEAR(now.velocity.x(), (i + 1) * kStep * kGravity * std::sin(0.15), 2e-3) << i;
+  }
+}
+
 TEST(DynamicTruck, StandsStillAfterAStopInATightTurn) {
   for (const bool rough_road : {false, true}) {
     DynamicTruck truck(shippedTruck(), {Load::kLoaded, 5, rough_road, 0.0});

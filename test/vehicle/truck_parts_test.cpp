@@ -123,6 +123,13 @@ TEST(AxleTyre, BrakeIsNoStrongerThanTheGrip) {
   EXPECT_NEAR(force, -0.95 * 0.5 * 0.6 * 3e5, 1e-6);
 }
 
+TEST(AxleTyre, ReleasedBrakeLetsGoAtOnce) {
+  AxleTyre t = tyre(3e5);
+  for (int i = 0; i < 1000; ++i) t.step(1.0, 0.0, 3e5, 1.0, 1e5, 0.0, kStep);
+  EXPECT_NEAR(t.step(1.0, 0.0, 3e5, 1.0, 1e5, 0.0, kStep).along, -1e5, 1e-6);
+  EXPECT_NEAR(t.step(1.0, 0.0, 3e5, 1.0, 1e3, 0.0, kStep).along, -1e3, 1e-6);
+}
+
 TEST(DriveTrain, OneStopWarmsTheBrakesByTheTrucksEnergy) {
   DriveTrain train(shippedTruck(), Load::kLoaded);
   train.reset(0.0);

@@ -63,7 +63,8 @@ TEST(Urdf, CommittedFileIsWhatTheTruckFileGives) {
 }
 
 TEST(Urdf, FollowsTheTruckFile) {
-  const Outcome generated = generate(changedTruck("front_axle_to_hinge: 1.95", "front_axle_to_hinge: 2.05"));
+  const Outcome generated =
+      generate(changedTruck("front_axle_to_hinge: 1.95", "front_axle_to_hinge: 2.05"));
   EXPECT_EQ(generated.status, 0);
   EXPECT_NE(generated.output, read(kUrdf));
   EXPECT_NE(generated.output.find("<origin xyz=\"-2.05 0 0\""), std::string::npos);
