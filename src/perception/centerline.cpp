@@ -12,6 +12,10 @@ using geometry::PathPoint;
 using geometry::Point;
 using geometry::Pose;
 
+constexpr double kSeenComing = 2.5;     // [m] along the tunnel, between a width expected and met
+constexpr double kSmoothReach = 0.5;    // [m]
+constexpr std::size_t kFewestInFit = 4;  // nodes in a parabola's window
+
 bool isFinite(const Pose& pose) {
   return std::isfinite(pose.x) && std::isfinite(pose.y) && std::isfinite(pose.heading);
 }
@@ -150,7 +154,7 @@ TunnelReason CenterlineEstimator::measure(const Walls& walls) {
   if (!paired_now_ && !last_width_) return TunnelReason::kNeverPaired;
   const bool left_longer = left.size() > right.size();
   followWall(left_longer ? left : right, left_longer ? 1.0 : -1.0);
-  return measured_.size() < 3 ? TunnelReason::kPoorFit : TunnelReason::kNone;
+  return measured_.size() < kFewestInFit ? TunnelReason::kPoorFit : TunnelReason::kNone;
 }
 
 // Continues the measured nodes along one wall, at the last width.
@@ -185,17 +189,14 @@ TunnelReason CenterlineEstimator::checkWidth(const std::optional<Pose>& pose) {
   if (!(width >= parameters_.width_min && width <= parameters_.width_max)) {
     return TunnelReason::kWidthImplausible;
   }
-  double expected = last_width_.value_or(width);
+  double jump = std::abs(width - last_width_.value_or(width));
   if (pose && !memory_.empty()) {
     const Point place = pose->transform(measured_.front().position);
-    const auto nearest = std::min_element(memory_.begin(), memory_.end(), [&](const Node& a, const Node& b) {
-      return (a.position - place).squaredNorm() < (b.position - place).squaredNorm();
-    });
-    expected = nearest->width;
+    for (const Node& node : memory_) {
+      if ((node.position - place).norm() < kSeenComing) jump = std::min(jump, std::abs(width - node.width));
+    }
   }
-  if (std::abs(width - expected) > parameters_.width_jump_max && ++jumps_ < parameters_.jump_scans) {
-    return TunnelReason::kWidthJump;
-  }
+  if (jump > parameters_.width_jump_max && ++jumps_ < parameters_.jump_scans) return TunnelReason::kWidthJump;
   if (jumps_ >= parameters_.jump_scans) memory_.clear();
   jumps_ = 0;
   if (paired_now_) last_width_ = width;
@@ -276,7 +277,8 @@ void CenterlineEstimator::fitPath() {
   path_.clear();
   std::size_t first = 0;
   std::size_t last = 0;
-  const double reach = parameters_.fit_reach;
+  // One scan's curve is smooth already: its own derivatives are better than a wide parabola's at its end.
+  const double reach = memory_.empty() ? kSmoothReach : parameters_.fit_reach;
   const std::size_t end = nodes_.size() - 1;
   for (std::size_t i = 0; i <= end; ++i) {
     const auto distance = [&](std::size_t k) { return (nodes_[k].position - nodes_[i].position).norm(); };
@@ -285,8 +287,12 @@ void CenterlineEstimator::fitPath() {
     // At the ends the window is the whole first or last stretch.
     std::size_t from = first;
     std::size_t to = last;
-    while (to < end && (nodes_[to].position - nodes_[from].position).norm() < 2.0 * reach) ++to;
-    while (from > 0 && (nodes_[to].position - nodes_[from].position).norm() < 2.0 * reach) --from;
+    const auto too_small = [&] {
+      return to - from < kFewestInFit - 1 ||
+             (nodes_[to].position - nodes_[from].position).norm() < 2.0 * reach;
+    };
+    while (to < end && too_small()) ++to;
+    while (from > 0 && too_small()) --from;
     const Point direction = (nodes_[to].position - nodes_[from].position).normalized();
     const Parabola fit = fitParabola(nodes_, from, to, nodes_[i].position, direction);
     const double a = fit.coefficients(0);

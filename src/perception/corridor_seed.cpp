@@ -21,15 +21,22 @@ float gridValue(int i, int count, double largest) {
 CorridorSeeder::CorridorSeeder(const WallSegmentationParameters& parameters)
     : parameters_(parameters), bin_(static_cast<float>(parameters.width_max / kBins)) {}
 
+void CorridorSeeder::gather(float x, float y) {
+  if (!x_.empty()) {
+    const float dx = x - x_.back();
+    const float dy = y - y_.back();
+    if (dx * dx + dy * dy < kSpacingInSeed * kSpacingInSeed) return;
+  }
+  x_.push_back(x);
+  y_.push_back(y);
+}
+
 void CorridorSeeder::gatherNear(const std::vector<PointGroup>& groups) {
   x_.clear();
   y_.clear();
   const auto radius = static_cast<float>(parameters_.seed_radius);
   for (const PointGroup& g : groups) {
-    if (g.x * g.x + g.y * g.y > radius * radius) continue;
-    if (!x_.empty() && std::hypot(g.x - x_.back(), g.y - y_.back()) < kSpacingInSeed) continue;
-    x_.push_back(g.x);
-    y_.push_back(g.y);
+    if (g.x * g.x + g.y * g.y < radius * radius) gather(g.x, g.y);
   }
 }
 
@@ -67,6 +74,18 @@ double CorridorSeeder::offsetOf(const Heap& heap, double side) const {
   return side * static_cast<double>(bin_ * (static_cast<float>(heap.bin) - 0.5F + shift));
 }
 
+CorridorSeed CorridorSeeder::judge(float heading, float curvature, float& votes) {
+  vote(heading, curvature);
+  const Heap left = highestHeap(left_);
+  const Heap right = highestHeap(right_);
+  // A straight guess wins a tie.
+  votes = left.votes + right.votes - 2.0F * std::abs(heading) - 10.0F * std::abs(curvature);
+  CorridorSeed seed{heading, curvature, std::nullopt, std::nullopt};
+  if (left.votes >= kFewestVotes) seed.left = offsetOf(left, 1.0);
+  if (right.votes >= kFewestVotes) seed.right = offsetOf(right, -1.0);
+  return seed;
+}
+
 std::optional<CorridorSeed> CorridorSeeder::find(const std::vector<PointGroup>& groups) {
   gatherNear(groups);
   float best_votes = kFewestVotes;
@@ -74,21 +93,31 @@ std::optional<CorridorSeed> CorridorSeeder::find(const std::vector<PointGroup>& 
   for (int i = 0; i < kHeadings; ++i) {
     const float heading = gridValue(i, kHeadings, parameters_.seed_heading_max);
     for (int j = 0; j < kCurvatures; ++j) {
-      const float curvature = gridValue(j, kCurvatures, parameters_.seed_curvature_max);
-      vote(heading, curvature);
-      const Heap left = highestHeap(left_);
-      const Heap right = highestHeap(right_);
-      // A straight guess wins a tie.
-      const float votes = left.votes + right.votes - 2.0F * std::abs(heading) - 10.0F * std::abs(curvature);
-      if (votes <= best_votes) continue;
+      float votes = 0.0F;
+      const CorridorSeed seed = judge(heading, gridValue(j, kCurvatures, parameters_.seed_curvature_max), votes);
+      if (votes <= best_votes || (!seed.left && !seed.right)) continue;
       best_votes = votes;
-      best = CorridorSeed{heading, curvature, std::nullopt, std::nullopt};
-      if (left.votes >= kFewestVotes) best->left = offsetOf(left, 1.0);
-      if (right.votes >= kFewestVotes) best->right = offsetOf(right, -1.0);
+      best = seed;
     }
   }
-  if (best && !best->left && !best->right) return std::nullopt;
   return best;
+}
+
+CorridorSeed CorridorSeeder::findAlong(const std::vector<PointGroup>& groups, const geometry::Pose& frame,
+                                       double curvature, double length) {
+  x_.clear();
+  y_.clear();
+  const auto c = static_cast<float>(std::cos(frame.heading));
+  const auto s = static_cast<float>(std::sin(frame.heading));
+  const auto x0 = static_cast<float>(frame.x);
+  const auto y0 = static_cast<float>(frame.y);
+  for (const PointGroup& g : groups) {
+    const float along = c * (g.x - x0) + s * (g.y - y0);
+    if (along < 0.0F || along > static_cast<float>(length)) continue;
+    gather(along, c * (g.y - y0) - s * (g.x - x0));
+  }
+  float votes = 0.0F;
+  return judge(0.0F, static_cast<float>(curvature), votes);
 }
 
 }  // namespace tunnel_pilot::perception

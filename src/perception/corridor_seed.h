@@ -25,6 +25,9 @@ class CorridorSeeder {
  public:
   explicit CorridorSeeder(const WallSegmentationParameters& parameters);
   std::optional<CorridorSeed> find(const std::vector<PointGroup>& groups);
+  /// Walls left and right along the arc through `frame`, from the groups within `length` [m] ahead of it.
+  CorridorSeed findAlong(const std::vector<PointGroup>& groups, const geometry::Pose& frame,
+                         double curvature, double length);
 
  private:
   static constexpr int kBins = 64;  // either side
@@ -33,6 +36,8 @@ class CorridorSeeder {
     float votes = 0.0F;
   };
   void gatherNear(const std::vector<PointGroup>& groups);
+  void gather(float x, float y);
+  CorridorSeed judge(float heading, float curvature, float& votes);
   void vote(float heading, float curvature);
   Heap highestHeap(const float* votes) const;
   double offsetOf(const Heap& heap, double side) const;

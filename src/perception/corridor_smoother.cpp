@@ -82,6 +82,21 @@ void CorridorSmoother::measure(double side, const Slice& slice, double variance)
   fold(gain * innovation, step.node);
 }
 
+void CorridorSmoother::rewind(std::size_t count) {
+  steps_.resize(count);
+  steps_.back().node = steps_.back().predicted;
+  steps_.back().covariance = steps_.back().predicted_covariance;
+}
+
+void CorridorSmoother::step(double shift, double half_width, double deviation) {
+  Step& last = steps_.back();
+  fold({shift, 0.0, 0.0, half_width - last.predicted.half_width}, last.predicted);
+  last.predicted_covariance(0, 0) += deviation * deviation;
+  last.predicted_covariance(3, 3) += deviation * deviation;
+  last.node = last.predicted;
+  last.covariance = last.predicted_covariance;
+}
+
 void CorridorSmoother::fold(const Vector& error, CorridorNode& node) {
   node.pose.x -= error(0) * std::sin(node.pose.heading);
   node.pose.y += error(0) * std::cos(node.pose.heading);

@@ -38,6 +38,8 @@ class CorridorSmoother {
   };
   /// Measures a wall of the last node; `side` +1 left, -1 right.
   void measure(double side, const Slice& slice, double variance);
+  /// The tunnel changes its width at the last node: a known step, which the smoother does not spread.
+  void step(double shift, double half_width, double deviation);
   /// Variance with which the wall of the last node is expected [m^2].
   double expectedVariance(double side) const;
   /// Runs back over all nodes; afterwards node(i) is the smoothed one.
@@ -47,7 +49,8 @@ class CorridorSmoother {
   const CorridorNode& node(std::size_t i) const { return steps_[i].node; }
   const CorridorNode& last() const { return steps_.back().node; }
   const Matrix& covariance(std::size_t i) const { return steps_[i].covariance; }
-  void truncate(std::size_t count) { steps_.resize(count); }
+  /// Forgets the nodes after the first `count`, and what was measured at the last of these.
+  void rewind(std::size_t count);
 
  private:
   struct Step {

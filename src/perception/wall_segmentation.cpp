@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -13,16 +15,31 @@
 namespace tunnel_pilot::perception {
 namespace {
 
+constexpr std::size_t kMaxNodes = 100;      // slices across the tunnel
+constexpr double kUnseenBeforeWidening = 2.0;  // [m] without either wall before another width is looked for
+constexpr double kWideningLength = 5.0;     // [m] over which it must show
+constexpr double kWideningDeviation = 0.2;  // [m] of the new walls' places
+constexpr double kCoverageMin = 0.1;          // of a slice's length
+constexpr double kHuber = 1.5;               // deviations beyond which a slice counts less
 constexpr double kCurveSpacing = 0.5;  // [m] of the fitted curves' samples
+// With so much of the near stretch seen on the better wall, the last scan's tunnel holds; with so much on
+// the worse, both walls do.
+constexpr double kTrackedSupport = 0.7;
+constexpr double kPairedSupport = 0.4;
+constexpr int kUnpairedScansMax = 150;
+constexpr double kWidthDeviationMin = 0.03;  // [m] of the last scan's half width
+constexpr double kWidthDeviationMax = 0.10;  // [m]
+constexpr Stamp kGuessAge = std::chrono::milliseconds(500);
 constexpr std::array<double, 2> kSides = {1.0, -1.0};
 
-// Which node a group lies beside, and how far off the expected wall, for each group that was taken.
-struct Taken {
-  int group;
-  int node;
-};
-
 double square(double x) { return x * x; }
+
+void moveAlongArc(double length, CorridorNode& node) {
+  const double mean_heading = node.pose.heading + 0.5 * length * node.curvature;
+  node.pose.x += length * std::cos(mean_heading);
+  node.pose.y += length * std::sin(mean_heading);
+  node.pose.heading += length * node.curvature;
+}
 
 }  // namespace
 
@@ -54,6 +71,13 @@ WallSegmentationParameters loadWallSegmentation(config::Node node) {
 }
 
 struct WallSegmentation::Impl {
+  // Shares of the near slices in which a wall was seen [1].
+  struct Support {
+    double better = 0.0;
+    double worse = 0.0;
+    bool left_better = true;
+  };
+
   explicit Impl(const WallSegmentationParameters& parameters)
       : p(parameters),
         seeder(p),
@@ -65,13 +89,25 @@ struct WallSegmentation::Impl {
   PointGrid grid;
   std::vector<PointGroup> groups;
   std::vector<int> order;                            // finite points of the input, as indices
-  std::array<std::vector<Taken>, 2> taken;           // by side
+  std::array<std::vector<std::int8_t>, 2> taken;     // by side and group: the node it was taken for, or -1
   std::array<std::vector<unsigned char>, 2> seen;    // by side and node: the wall was measured there
 
   void group(const pcl::PointCloud<pcl::PointXYZ>& cloud, const std::vector<int>& indices);
-  void start(const CorridorSeed& seed);
-  void follow(const CorridorSeed& seed);
-  bool measure(int side);
+  std::optional<CorridorNode> guess;                 // where the last scan's tunnel began
+  Stamp guess_stamp{};
+  double guess_width_deviation = 0.0;                // of its half width [m]
+  bool guess_held = false;                           // the present walls were found with its help
+  int unpaired_scans = 0;                            // for which one wall alone held the guess
+
+  void find(Stamp stamp);
+  CorridorNode startOf(const CorridorSeed& seed) const;
+  void follow(const CorridorNode& start, const CorridorSmoother::Vector& deviations, bool left, bool right);
+  bool followGuess(Stamp stamp);
+  void keepGuess(Stamp stamp, const Walls& walls);
+  void clear();
+  Support support() const;
+  bool widen(std::size_t node);
+  bool measure(std::size_t side);
   std::size_t firstSeen() const;
   void finish(const pcl::PointCloud<pcl::PointXYZ>& cloud, int side, std::size_t first, Wall& wall);
   void collectInliers(const pcl::PointCloud<pcl::PointXYZ>& cloud, int side, Wall& wall);
@@ -83,6 +119,8 @@ WallSegmentation::WallSegmentation(const WallSegmentationParameters& parameters)
     : impl_(new Impl(parameters)), parameters_(parameters) {}
 
 WallSegmentation::~WallSegmentation() = default;
+
+void WallSegmentation::reset() { impl_->guess.reset(); }
 
 const Walls& WallSegmentation::segment(Stamp stamp) {
   walls_.stamp = stamp;
@@ -97,12 +135,13 @@ const Walls& WallSegmentation::segment(Stamp stamp) {
   impl_->group(*input_, *indices_);
   walls_.enough_returns = static_cast<int>(impl_->order.size()) >= parameters_.points_min;
   if (walls_.enough_returns) {
-    if (const std::optional<CorridorSeed> seed = impl_->seeder.find(impl_->groups)) {
-      impl_->follow(*seed);
-      const std::size_t first = impl_->firstSeen();
-      impl_->finish(*input_, 0, first, walls_.left);
-      impl_->finish(*input_, 1, first, walls_.right);
-    }
+    impl_->find(stamp);
+    const std::size_t first = impl_->firstSeen();
+    impl_->finish(*input_, 0, first, walls_.left);
+    impl_->finish(*input_, 1, first, walls_.right);
+    impl_->keepGuess(stamp, walls_);
+  } else {
+    impl_->guess.reset();
   }
   deinitCompute();
   return walls_;
@@ -140,7 +179,89 @@ void WallSegmentation::Impl::group(const pcl::PointCloud<pcl::PointXYZ>& cloud,
   close();
 }
 
-void WallSegmentation::Impl::start(const CorridorSeed& seed) {
+// The last scan's tunnel is the best first guess: beside a parked vehicle or an opening one wall shows where
+// the other still is, and a vote would take the vehicle for it. Where the guess does not hold, or has held
+// on to one wall for long, the near returns vote.
+void WallSegmentation::Impl::find(Stamp stamp) {
+  grid.fill(groups);
+  const bool tracked = followGuess(stamp);
+  guess_held = tracked;
+  Support tracked_support;
+  if (tracked) {
+    tracked_support = support();
+    const bool paired = tracked_support.worse >= kPairedSupport;
+    unpaired_scans = paired ? 0 : unpaired_scans + 1;
+    if (tracked_support.better >= kTrackedSupport && unpaired_scans < kUnpairedScansMax) return;
+  }
+  const std::optional<CorridorSeed> seed = seeder.find(groups);
+  if (seed) {
+    const bool paired = seed->left && seed->right;
+    follow(startOf(*seed), {0.3, 0.15, 0.05, paired ? 0.3 : 1e-3}, seed->left.has_value(),
+           seed->right.has_value());
+    const Support voted = support();
+    if (voted.better + voted.worse > tracked_support.better + tracked_support.worse) {
+      unpaired_scans = 0;
+      guess_held = false;
+      return;
+    }
+  }
+  if (tracked) {
+    followGuess(stamp);
+  } else if (!seed) {
+    clear();
+  }
+}
+
+bool WallSegmentation::Impl::followGuess(Stamp stamp) {
+  if (!guess || stamp < guess_stamp || stamp - guess_stamp > kGuessAge) return false;
+  follow(*guess, {0.08, 0.06, 0.03, guess_width_deviation}, true, true);
+  return true;
+}
+
+// Of the first slice that was seen, moved back along its arc to where the curves begin.
+void WallSegmentation::Impl::keepGuess(Stamp stamp, const Walls& walls) {
+  const bool paired = walls.left.found && walls.right.found;
+  const bool single = walls.left.found != walls.right.found;
+  if (!paired && !(single && guess)) {
+    guess.reset();
+    return;
+  }
+  const std::size_t first = firstSeen();
+  CorridorNode next = smoother.node(first);
+  const Support seen_near = support();
+  if (guess && guess_held && seen_near.worse < kPairedSupport) {
+    // One wall alone says nothing new about the width: the place of the better one counts.
+    const double side = seen_near.left_better ? 1.0 : -1.0;
+    const double shift = side * (next.half_width - guess->half_width);
+    next.pose.x -= shift * std::sin(next.pose.heading);
+    next.pose.y += shift * std::cos(next.pose.heading);
+    next.half_width = guess->half_width;
+  } else {
+    const double deviation = std::sqrt(smoother.covariance(first)(3, 3));
+    guess_width_deviation = std::clamp(deviation, kWidthDeviationMin, kWidthDeviationMax);
+  }
+  moveAlongArc(-p.step * static_cast<double>(first), next);
+  guess = next;
+  guess_stamp = stamp;
+}
+
+// Counted from the first slice with any wall.
+WallSegmentation::Impl::Support WallSegmentation::Impl::support() const {
+  const auto near = static_cast<std::size_t>(p.seed_radius / p.step);
+  std::size_t first = 0;
+  while (first < near && first < seen[0].size() && !seen[0][first] && !seen[1][first]) ++first;
+  std::array<double, 2> share{};
+  for (std::size_t side = 0; side < 2; ++side) {
+    const std::vector<unsigned char>& slices = seen[side];
+    const std::size_t last = std::min(first + near, slices.size());
+    const auto count = std::count(slices.begin() + static_cast<std::ptrdiff_t>(std::min(first, last)),
+                                  slices.begin() + static_cast<std::ptrdiff_t>(last), 1);
+    share[side] = static_cast<double>(count) / static_cast<double>(near);
+  }
+  return {std::max(share[0], share[1]), std::min(share[0], share[1]), share[0] >= share[1]};
+}
+
+CorridorNode WallSegmentation::Impl::startOf(const CorridorSeed& seed) const {
   const double nominal = 0.5 * (p.width_min + p.width_max);
   const double left = seed.left ? *seed.left : *seed.right + nominal;
   const double right = seed.right ? *seed.right : *seed.left - nominal;
@@ -150,62 +271,95 @@ void WallSegmentation::Impl::start(const CorridorSeed& seed) {
   node.half_width = 0.5 * (left - right);
   // Back along the arc to where the curves shall begin.
   node.pose = {-middle * std::sin(seed.heading), middle * std::cos(seed.heading), seed.heading};
-  const double back = p.look_behind;
-  const double mean_heading = seed.heading - 0.5 * back * node.curvature;
-  node.pose.x -= back * std::cos(mean_heading);
-  node.pose.y -= back * std::sin(mean_heading);
-  node.pose.heading -= back * node.curvature;
-  const bool paired = seed.left && seed.right;
-  smoother.start(node, {0.3, 0.15, 0.05, paired ? 0.3 : 1e-3});
+  moveAlongArc(-p.look_behind, node);
+  return node;
 }
 
-void WallSegmentation::Impl::follow(const CorridorSeed& seed) {
-  grid.fill(groups);
-  start(seed);
+void WallSegmentation::Impl::clear() {
   for (std::size_t side = 0; side < 2; ++side) {
-    taken[side].clear();
+    taken[side].assign(groups.size(), -1);
     seen[side].clear();
   }
-  const std::array<bool, 2> followed = {seed.left.has_value(), seed.right.has_value()};
-  const auto steps = static_cast<int>((p.lookahead + p.look_behind) / p.step);
-  double unseen = 0.0;
-  for (int k = 0; k <= steps; ++k) {
-    if (k > 0) smoother.advance(p.step);
+}
+
+void WallSegmentation::Impl::follow(const CorridorNode& start, const CorridorSmoother::Vector& deviations,
+                                    bool left, bool right) {
+  clear();
+  smoother.start(start, deviations);
+  const std::array<bool, 2> followed = {left, right};
+  const std::size_t nodes = std::min(static_cast<std::size_t>((p.lookahead + p.look_behind) / p.step), kMaxNodes);
+  const auto widen_after = static_cast<std::size_t>(std::ceil(kUnseenBeforeWidening / p.step));
+  std::size_t unseen = 0;        // slices without either wall, at the end
+  std::size_t widened_at = 0;    // node at which a change of width was looked for last
+  while (smoother.size() <= nodes) {
     bool any = false;
-    for (int side = 0; side < 2; ++side) {
-      const bool measured = followed[static_cast<std::size_t>(side)] && measure(side);
-      seen[static_cast<std::size_t>(side)].push_back(static_cast<unsigned char>(measured));
+    for (std::size_t side = 0; side < 2; ++side) {
+      const bool measured = followed[side] && measure(side);
+      seen[side].push_back(static_cast<unsigned char>(measured));
       any = any || measured;
     }
-    unseen = any ? 0.0 : unseen + p.step;
-    if (unseen > p.gap_max) break;
+    unseen = any ? 0 : unseen + 1;
+    if (static_cast<double>(unseen) * p.step > p.gap_max) break;
+    const std::size_t first_unseen = smoother.size() - unseen;
+    if (unseen == widen_after && first_unseen > widened_at) {
+      widened_at = first_unseen;
+      if (widen(first_unseen)) {
+        unseen = 0;
+        continue;
+      }
+    }
+    smoother.advance(p.step);
   }
   smoother.smooth();
 }
 
-bool WallSegmentation::Impl::measure(int side) {
-  const double sign = kSides[static_cast<std::size_t>(side)];
+// Where both walls are lost at once, the tunnel may go on wider or narrower along the same line. If it does,
+// goes back to the first slice without them and takes the new width from there.
+bool WallSegmentation::Impl::widen(std::size_t node) {
+  const CorridorNode& at = smoother.node(node);
+  const CorridorSeed walls = seeder.findAlong(groups, at.pose, at.curvature, kWideningLength);
+  if (!walls.left || !walls.right) return false;
+  const double width = *walls.left - *walls.right;
+  const double shift = 0.5 * (*walls.left + *walls.right);
+  if (width < p.width_min || width > p.width_max || std::abs(shift) > p.gate_max) return false;
+  smoother.rewind(node + 1);
+  smoother.step(shift, 0.5 * width, kWideningDeviation);
+  for (std::vector<unsigned char>& slices : seen) slices.resize(node);
+  return true;
+}
+
+bool WallSegmentation::Impl::measure(std::size_t side) {
+  const double sign = kSides[side];
   const CorridorNode node = smoother.last();
   const double deviation = std::sqrt(smoother.expectedVariance(sign) + square(p.wall_deviation));
   const double gate = std::clamp(3.0 * deviation, p.gate_min, p.gate_max);
   const double middle = sign * node.half_width;
   CorridorSmoother::Slice slice;
   int count = 0;
-  std::vector<Taken>& mine = taken[static_cast<std::size_t>(side)];
-  const int at = static_cast<int>(smoother.size()) - 1;
+  float nearest = std::numeric_limits<float>::max();
+  float farthest = std::numeric_limits<float>::lowest();
+  std::vector<std::int8_t>& mine = taken[side];
+  const auto at = static_cast<std::int8_t>(smoother.size() - 1);
   grid.visitSlice(groups, node.pose, 0.5 * p.step, middle - gate, middle + gate,
                   [&](int group, float along, float lateral) {
+                    nearest = std::min(nearest, along);
+                    farthest = std::max(farthest, along);
                     slice.along += along;
                     slice.along_squared += along * along;
                     slice.lateral += lateral;
                     ++count;
-                    mine.push_back({group, at});
+                    mine[static_cast<std::size_t>(group)] = at;
                   });
   if (count == 0) return false;
   slice.along /= count;
   slice.along_squared /= count;
   slice.lateral /= count;
-  smoother.measure(sign, slice, square(p.wall_deviation));
+  // Half a wall and half something before it make an outlier: the farther off, the less it counts (Huber).
+  const double miss = std::abs(slice.lateral - middle);
+  const double doubt = std::max(1.0, miss / (kHuber * deviation));
+  // The face of something that juts out of the wall is short along it, and so counts little.
+  const double coverage = std::clamp((farthest - nearest) / p.step, kCoverageMin, 1.0);
+  smoother.measure(sign, slice, doubt / coverage * square(p.wall_deviation));
   return true;
 }
 
@@ -269,29 +423,40 @@ void WallSegmentation::Impl::drawCurve(int side, std::size_t first, std::size_t 
 
 void WallSegmentation::Impl::collectInliers(const pcl::PointCloud<pcl::PointXYZ>& cloud, int side,
                                             Wall& wall) {
+  struct Place {
+    float x, y, cosine, sine, offset, half_bend;
+  };
   const double sign = kSides[static_cast<std::size_t>(side)];
+  std::array<Place, kMaxNodes> places;
+  for (std::size_t i = 0; i < smoother.size(); ++i) {
+    const CorridorNode& n = smoother.node(i);
+    const double offset = sign * n.half_width;
+    const double bend = n.curvature / std::max(0.2, 1.0 - offset * n.curvature);
+    places[i] = {static_cast<float>(n.pose.x),
+                 static_cast<float>(n.pose.y),
+                 static_cast<float>(std::cos(n.pose.heading)),
+                 static_cast<float>(std::sin(n.pose.heading)),
+                 static_cast<float>(offset),
+                 static_cast<float>(0.5 * bend)};
+  }
+  const auto reach = static_cast<float>(p.inlier_distance);
+  const std::vector<std::int8_t>& node_of = taken[static_cast<std::size_t>(side)];
   double sum = 0.0;
-  for (const Taken& t : taken[static_cast<std::size_t>(side)]) {
-    const CorridorNode& n = smoother.node(static_cast<std::size_t>(t.node));
-    const double c = std::cos(n.pose.heading);
-    const double s = std::sin(n.pose.heading);
-    const double bend = n.curvature / std::max(0.2, 1.0 - sign * n.half_width * n.curvature);
-    const PointGroup& g = groups[static_cast<std::size_t>(t.group)];
-    for (int k = g.first; k < g.last; ++k) {
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    if (node_of[g] < 0) continue;
+    const Place& n = places[static_cast<std::size_t>(node_of[g])];
+    for (int k = groups[g].first; k < groups[g].last; ++k) {
       const int index = order[static_cast<std::size_t>(k)];
       const pcl::PointXYZ& point = cloud.points[static_cast<std::size_t>(index)];
-      const double along = c * (point.x - n.pose.x) + s * (point.y - n.pose.y);
-      const double lateral = c * (point.y - n.pose.y) - s * (point.x - n.pose.x);
-      const double miss = lateral - sign * n.half_width - 0.5 * bend * along * along;
-      if (std::abs(miss) > p.inlier_distance) continue;
-      sum += miss * miss;
+      const float along = n.cosine * (point.x - n.x) + n.sine * (point.y - n.y);
+      const float lateral = n.cosine * (point.y - n.y) - n.sine * (point.x - n.x);
+      const float miss = lateral - n.offset - n.half_bend * along * along;
+      if (std::abs(miss) > reach) continue;
+      sum += static_cast<double>(miss * miss);
       wall.indices.push_back(index);
     }
   }
   if (!wall.indices.empty()) wall.residual = std::sqrt(sum / static_cast<double>(wall.indices.size()));
-  std::sort(wall.indices.begin(), wall.indices.end());
-  // A group on the border of two slices may have been taken twice.
-  wall.indices.erase(std::unique(wall.indices.begin(), wall.indices.end()), wall.indices.end());
 }
 
 }  // namespace tunnel_pilot::perception

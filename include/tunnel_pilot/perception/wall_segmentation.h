@@ -66,6 +66,9 @@ class WallSegmentation : public pcl::PCLBase<pcl::PointXYZ> {
   /// result is this object's and stands until the next call. Points that are not finite are ignored.
   const Walls& segment(Stamp stamp);
 
+  /// Forgets the last scan, whose tunnel is the first guess for the next one (after a clock jump).
+  void reset();
+
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
