@@ -71,7 +71,7 @@ CanBridge::CanBridge(const BridgeParameters& parameters, const vehicle::TruckGeo
       odometry_(truck, parameters.gyro_bias_time, parameters.standstill_speed),
       watch_(parameters.tracking) {}
 
-// ---------------------------------------------------------------------------------- commands and
+// ------------------------------------------------------------------------------------ commands and
 // operator
 
 std::string CanBridge::whyRefused(const Command& command, Stamp now) const {
@@ -174,7 +174,7 @@ void CanBridge::clockJumped(Stamp now) {
   sendIfDue(now);
 }
 
-// ------------------------------------------------------------------------------------------- what is
+// ----------------------------------------------------------------------------------------- what is
 // wrong
 
 std::optional<Event> CanBridge::linkFault(Stamp now) const {
@@ -327,7 +327,7 @@ bool CanBridge::standsStill(Stamp now) const {
   return link_.fresh(now) && std::abs(link_.feedback().speed) < parameters_.standstill_speed;
 }
 
-// --------------------------------------------------------------------------------------------- what is
+// ----------------------------------------------------------------------------------------- what is
 // sent
 
 bool CanBridge::commandUsable(Stamp now) const { return !commandFault(now); }

@@ -14,6 +14,7 @@ TruckControllerParameters loadTruckController(config::Node node) {
   p.stop_deceleration = node.number("stop_deceleration", "m/s^2", 0.5, p.service_deceleration);
   p.hold_deceleration = node.number("hold_deceleration", "m/s^2", 0.5, p.service_deceleration);
   p.standstill_speed = node.number("standstill_speed", "m/s", 0.01, 0.5);
+  p.rollback_speed = node.number("rollback_speed", "m/s", 0.1, 1.0);
   p.speed_gain = node.number("speed_gain", "1/s", 0.1, 10.0);
   p.speed_integral_gain = node.number("speed_integral_gain", "1/s^2", 0.0, 5.0);
   p.speed_lead = node.number("speed_lead", "m/s", 0.1, 2.0);
@@ -72,7 +73,7 @@ vehicle::PlantInput TruckController::step(const SensedTruck& truck, Stamp now) {
   return out;
 }
 
-// ------------------------------------------------------------------------------------------- what it
+// ----------------------------------------------------------------------------------------- what it
 // hears
 
 void TruckController::receive(Stamp now) {
@@ -155,7 +156,7 @@ void TruckController::decide(const SensedTruck& truck, Stamp now) {
   }
 }
 
-// ---------------------------------------------------------------------------------------------- what it
+// ----------------------------------------------------------------------------------------- what it
 // does
 
 vehicle::PlantInput TruckController::obey(const SensedTruck& truck, double dt) {
@@ -192,9 +193,11 @@ double TruckController::followSpeed(double wanted, double limit, double speed, d
   const double slope = dt > 0.0 ? (ramped_speed_ - before) / dt : 0.0;
   ramped_speed_ =
       std::clamp(ramped_speed_, speed - parameters_.speed_lead, speed + parameters_.speed_lead);
-  if (wanted <= 0.0 && std::abs(speed) < parameters_.standstill_speed) {
+  const bool held = wanted <= 0.0 && speed < parameters_.standstill_speed;
+  if (held || speed < -parameters_.rollback_speed) {
+    ramped_speed_ = 0.0;
     speed_integral_ = 0.0;
-    return -parameters_.hold_deceleration;
+    return brakeToStandstill(speed);
   }
   const double error = ramped_speed_ - speed;
   const double asked = slope + parameters_.speed_gain * error + speed_integral_;
@@ -205,7 +208,7 @@ double TruckController::followSpeed(double wanted, double limit, double speed, d
   return given;
 }
 
-// ----------------------------------------------------------------------------------------------- what
+// -------------------------------------------------------------------------------------------- what
 // it says
 
 void TruckController::sendFrames(const SensedTruck& truck, Stamp now) {

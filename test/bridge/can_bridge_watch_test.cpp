@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <map>
+#include <vector>
 
 #include "rig.h"
 
@@ -193,8 +195,68 @@ TEST_P(Watchdog, HealthyDriveOfTenMinutesNeverStops) {
   EXPECT_EQ(rig.controller->framesRejected(), 0u);
 }
 
-// --------------------------------------------------------------------------------------------------
-// DEGRADED
+// Worst latency of each row: from the last good word (or the fault) to the stop bit on the bus, worst of
+// all phases of the fault against frames, commands and ticks.
+enum class From { kFault, kLastCommand, kLastFeedback };
+
+struct LatencyRow {
+  const char* name;
+  double limit;  ///< [s], to which the period of the ticks is added
+  From from;
+  std::function<void(Rig&)> provoke;
+};
+
+std::vector<LatencyRow> latencyRows() {
+  const auto mute_feedback = [](Rig& rig) {
+    rig.to_bridge = [](const can::Frame& f) {
+      return f.id == can::kTruckFeedbackId ? std::nullopt : std::optional<can::Frame>(f);
+    };
+  };
+  return {
+      {"C3 all frames lost", 0.060, From::kLastFeedback, [](Rig& rig) { rig.truck_alive = false; }},
+      {"C3 TRUCK_FEEDBACK lost", 0.060, From::kLastFeedback, mute_feedback},
+      {"A1 commands lost", 0.100, From::kLastCommand, [](Rig& rig) { rig.arbiter_alive = false; }},
+      {"A2 operator's stop", 0.0, From::kFault, [](Rig& rig) { rig.bridge->stop(rig.now), rig.pump(); }},
+      {"A2 arbiter's stop", 0.020, From::kFault, [](Rig& rig) { rig.command.stop = true; }},
+      {"A4 operator's wheel", 0.020, From::kFault, [](Rig& rig) { rig.cab.steering_wheel = 0.2; }},
+      {"A4 key turned", 0.020, From::kFault, [](Rig& rig) { rig.cab.key = can::OperatorKey::kManual; }},
+      {"C6 foreign sender", 0.0, From::kFault,
+       [](Rig& rig) { rig.wire_to_bridge->send(*can::encode(can::TruckCommandFrame())); }},
+      {"truck's fault", 0.020, From::kFault,
+       [](Rig& rig) { rig.controller->setFaults(can::kFaultBrake); }},
+      {"T1 clock jumps back", 0.0, From::kFault,
+       [](Rig& rig) { rig.bridge->clockJumped(rig.now), rig.pump(); }},
+  };
+}
+
+double latency(const LatencyRow& row, double tick, int phase) {
+  Rig rig(tick);
+  rig.drive(1.0);
+  rig.run(0.001 * phase);
+  const std::size_t before = rig.judge.commands.size();
+  const Stamp start = row.from == From::kLastCommand    ? rig.last_command
+                      : row.from == From::kLastFeedback ? rig.last_feedback
+                                                        : rig.now;
+  row.provoke(rig);
+  rig.run(1.0, [&] { return rig.judge.commands.size() > before && rig.judge.last->stop; });
+  for (const std::string& complaint : rig.judge.complaints)
+    ADD_FAILURE() << row.name << ": " << complaint;
+  return rig.judge.last->stop ? toSeconds(rig.judge.times.back() - start) : 1e9;
+}
+
+TEST(WatchdogLatency, WorstOfAllPhasesIsWithinItsLimit) {
+  for (const double tick : {0.001, 0.005, 0.020}) {
+    for (const LatencyRow& row : latencyRows()) {
+      double worst = 0.0;
+      for (int phase = 0; phase < 40; ++phase) worst = std::max(worst, latency(row, tick, phase));
+      EXPECT_LE(worst, row.limit + tick + 0.0011) << row.name;
+      std::printf("  tick %2.0f ms: %-24s worst %6.1f ms (limit %3.0f ms and a tick)\n", 1e3 * tick,
+                  row.name, 1e3 * worst, 1e3 * row.limit);
+    }
+  }
+}
+
+// ---------------------------------------------------------------------------------------- DEGRADED
 
 TEST_P(Watchdog, LateMeasurementDegradesAndOneSecondOfHealthRecovers) {
   rig.drive();
@@ -225,7 +287,7 @@ TEST_P(Watchdog, SlowingForAnObstacleIsNoDegradation) {
   EXPECT_EQ(rig.state(), SafetyState::kActive);
 }
 
-// --------------------------------------------------------------------------------------- what is left
+// ------------------------------------------------------------------------------------ what is left
 // alone
 
 TEST_P(Watchdog, OneLostAndOneCorruptFrameInTenDoNoHarm) {

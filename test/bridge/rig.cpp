@@ -13,8 +13,7 @@ config::Node file(const std::string& name) {
 
 }  // namespace
 
-// -------------------------------------------------------------------------------------------------
-// Judge
+// ------------------------------------------------------------------------------------------- Judge
 
 void Judge::complain(const std::string& what, Stamp now) {
   complaints.push_back(std::to_string(toSeconds(now)) + " s: " + what);
@@ -60,8 +59,7 @@ void Judge::command(const can::Frame& frame, const BridgeStatus& status, Stamp l
   times.push_back(now);
 }
 
-// ---------------------------------------------------------------------------------------------------
-// Rig
+// --------------------------------------------------------------------------------------------- Rig
 
 BridgeParameters Rig::bridgeParameters() { return loadBridge(file("can_bridge.yaml")); }
 vehicle::TruckParameters Rig::truckParameters() { return vehicle::loadTruck(file("truck.yaml")); }
@@ -119,7 +117,7 @@ void Rig::moveTruck() {
 
 void Rig::pump() {
   while (const auto frame = wire_to_bridge->receive()) {
-    judge.frame(*frame, bridge->status(), last_feedback_, now);
+    judge.frame(*frame, bridge->status(), last_feedback, now);
     log.push_back(*frame);
     if (const auto passed = to_truck(*frame)) wire_to_truck->send(*passed);
   }
@@ -127,7 +125,7 @@ void Rig::pump() {
     log.push_back(*frame);
     const auto passed = to_bridge(*frame);
     if (!passed) continue;
-    if (can::decode<can::TruckFeedbackFrame>(*passed)) last_feedback_ = now;
+    if (can::decode<can::TruckFeedbackFrame>(*passed)) last_feedback = now;
     wire_to_bridge->send(*passed);
   }
 }
@@ -137,6 +135,7 @@ void Rig::sendCommand() {
   sent.sequence = command.sequence + sequence_++;
   sent.stamp = measurement.value_or(now - measurement_age);
   bridge->setCommand(sent, now);
+  last_command = now;
 }
 
 void Rig::drive(double speed) {

@@ -82,6 +82,8 @@ class Rig {
   std::unique_ptr<simulation::TruckController> controller;
   vehicle::KinematicTruck plant;
   Judge judge;
+  Stamp last_command{};         ///< when the bridge last got one
+  Stamp last_feedback{};        ///< when the bridge could last hear a good TRUCK_FEEDBACK
   std::vector<can::Frame> log;  ///< all frames, both ways
 
  private:
@@ -90,7 +92,6 @@ class Rig {
   void moveTruck();
 
   Stamp next_tick_, next_command_;
-  Stamp last_feedback_{};
   std::uint32_t sequence_ = 0;
 };
 

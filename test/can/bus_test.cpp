@@ -6,9 +6,13 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <csignal>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 
@@ -181,6 +185,49 @@ TEST(EmbeddedBus, DiscardsDatagramsThatAreNoDataFrame) {
   sendBytes(&frame, sizeof(frame));
   EXPECT_TRUE(here.receive());
   close(rogue);
+}
+
+// The program printed in docs/can.md, as it stands there.
+std::string documentedListener(const std::string& bus_name) {
+  std::ifstream file(std::string(TUNNEL_PILOT_SOURCE_DIR) + "/docs/can.md");
+  std::ostringstream text;
+  text << file.rdbuf();
+  const std::string document = text.str();
+  const std::size_t begin = document.find("```python\n") + 10;
+  std::string program = document.substr(begin, document.find("```", begin) - begin);
+  for (std::size_t at; (at = program.find("NAME")) != std::string::npos;)
+    program.replace(at, 4, bus_name);
+  return program;
+}
+
+TEST(EmbeddedBus, IsHeardByTheListenerOfTheDocument) {
+  const std::string name = uniqueName("python");
+  EmbeddedBus here(name);
+  const std::string script = here.folder() + "/listener.py";
+  std::ofstream(script) << documentedListener(name);
+  FILE* listener = popen(("timeout 20 python3 " + script).c_str(), "r");
+  ASSERT_NE(listener, nullptr);
+  const auto participants = [&] {
+    int count = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(here.folder())) {
+      count += entry.path().extension() == ".sock" ? 1 : 0;
+    }
+    return count;
+  };
+  for (int i = 0; i < 1000 && participants() < 2; ++i) usleep(10000);
+  Frame frame = makeFrame(0x120, 0xAB);
+  frame.length = 3;
+  here.send(frame);
+  char line[64] = "";
+  EXPECT_NE(fgets(line, sizeof(line), listener), nullptr);
+  EXPECT_STREQ(line, "120 ab0000\n");
+  for (const auto& entry : std::filesystem::directory_iterator(here.folder())) {
+    const std::string file = entry.path().filename();
+    if (file.rfind("listener-", 0) == 0 && entry.path().extension() == ".sock") {
+      kill(std::stoi(file.substr(9)), SIGTERM);
+    }
+  }
+  pclose(listener);
 }
 
 TEST(EmbeddedBus, TellsWhenItsSocketWasRemoved) {

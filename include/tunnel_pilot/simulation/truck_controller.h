@@ -23,6 +23,7 @@ struct TruckControllerParameters {
   double stop_deceleration;     ///< of a stop and of every brake to standstill [m/s^2]
   double hold_deceleration;     ///< demanded of the brake at standstill [m/s^2]
   double standstill_speed;      ///< below it the truck is held [m/s]
+  double rollback_speed;        ///< rolling back faster than this on a slope is braked [m/s]
   double speed_gain;            ///< of the speed loop [1/s]
   double speed_integral_gain;   ///< [1/s^2]
   double speed_lead;            ///< the ramped speed may run ahead of the measured one [m/s]

@@ -1,0 +1,250 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "tunnel_pilot/bridge/bridge_parameters.h"
+#include "tunnel_pilot/bridge/command_sender.h"
+#include "tunnel_pilot/bridge/odometry.h"
+#include "tunnel_pilot/bridge/steering_watch.h"
+#include "tunnel_pilot/bridge/truck_link.h"
+#include "tunnel_pilot/can/memory_bus.h"
+#include "tunnel_pilot/config/node.h"
+#include "tunnel_pilot/vehicle/kinematic_truck.h"
+
+namespace tunnel_pilot::bridge {
+namespace {
+
+constexpr double kDeg = 3.14159265358979323846 / 180.0;
+
+std::string configFile(const std::string& name) {
+  return std::string(TUNNEL_PILOT_SOURCE_DIR) + "/config/" + name;
+}
+vehicle::TruckParameters truck() { return vehicle::loadTruck(configFile("truck.yaml")); }
+Stamp ms(int milliseconds) { return std::chrono::milliseconds(milliseconds); }
+
+// -------------------------------------------------------------------------------------- parameters
+
+TEST(BridgeParameters, ShippedFileLoads) {
+  EXPECT_NO_THROW(loadBridge(config::loadFile(configFile("can_bridge.yaml"))));
+}
+
+TEST(BridgeParameters, EveryKeyIsNeededAndOfTheRightKind) {
+  const YAML::Node good = YAML::LoadFile(configFile("can_bridge.yaml"));
+  int keys = 0;
+  const auto refused = [](const YAML::Node& yaml, const std::string& key) {
+    try {
+      loadBridge(config::Node(yaml, "can_bridge.yaml"));
+    } catch (const config::ConfigError& e) {
+      return std::string(e.what()).find("'" + key + "'") != std::string::npos;
+    }
+    return false;
+  };
+  for (const auto& entry : good) {
+    const std::string key = entry.first.Scalar();
+    YAML::Node missing = YAML::Clone(good);
+    missing.remove(key);
+    EXPECT_TRUE(refused(missing, key)) << key;
+    for (const char* bad : {".nan", ".inf", "-1", "1e9", "'1'", "text", "~", "[1]"}) {
+      YAML::Node wrong = YAML::Clone(good);
+      wrong[key] = YAML::Load(bad);
+      EXPECT_THROW(loadBridge(config::Node(wrong, "x")), config::ConfigError) << key << ": " << bad;
+    }
+    ++keys;
+  }
+  EXPECT_EQ(keys, 20);
+  YAML::Node unknown = YAML::Clone(good);
+  unknown["typo"] = 1;
+  EXPECT_TRUE(refused(unknown, "typo"));
+}
+
+// ---------------------------------------------------------------------------------------- odometry
+
+TEST(Odometry, FollowsTheTruckThroughAnS) {
+  vehicle::KinematicTruck plant(truck());
+  plant.reset(geometry::Pose(), 0.0, 3.0);
+  Odometry odometry(truck().geometry, 2.0, 0.05);
+  for (int i = 0; i <= 40000; ++i) {  // 40 s, 120 m
+    const vehicle::PlantState& state = plant.state();
+    if (i % 20 == 0) {
+      odometry.update(state.articulation, state.articulation_rate, state.speed, state.yaw_rate, ms(i));
+    }
+    plant.step({0.25 * std::sin(0.3e-3 * i), 0.0}, {}, 1e-3);
+  }
+  const geometry::Pose error = plant.state().pose.relative(odometry.motion().pose);
+  EXPECT_LT(std::hypot(error.x, error.y), 0.06);
+  EXPECT_LT(std::abs(error.heading), 0.001);
+}
+
+TEST(Odometry, HoldsItsWayWithTheSensorsErrors) {
+  // Speed 1 % wrong, hinge 0.3 deg wrong, gyro 0.2 deg/s wrong: 5 s at rest, then 30 s (90 m) of
+  // driving.
+  vehicle::KinematicTruck plant(truck());
+  plant.reset(geometry::Pose(), 0.0, 0.0);
+  Odometry odometry(truck().geometry, 2.0, 0.05);
+  double way = 0.0;
+  for (int i = 0; i <= 35000; ++i) {
+    const vehicle::PlantState& state = plant.state();
+    if (i % 20 == 0) {
+      odometry.update(state.articulation + 0.3 * kDeg, state.articulation_rate, 1.01 * state.speed,
+                      state.yaw_rate + 0.2 * kDeg, ms(i));
+    }
+    way += state.speed * 1e-3;
+    const double drive = i > 5000 && state.speed < 3.0 ? 0.8 : 0.0;
+    plant.step({0.2 * std::sin(0.4e-3 * i), drive}, {}, 1e-3);
+  }
+  const geometry::Pose error = plant.state().pose.relative(odometry.motion().pose);
+  EXPECT_LT(std::hypot(error.x, error.y), 0.02 * way);
+  EXPECT_LT(std::abs(error.heading), 1.0 * kDeg) << "the gyro's bias alone would be worth 6 deg";
+  EXPECT_NEAR(odometry.gyroBias(), 0.2 * kDeg, 0.03 * kDeg);
+}
+
+TEST(Odometry, DoesNotLearnTheBiasWhileDriving) {
+  Odometry odometry(truck().geometry, 2.0, 0.05);
+  for (int i = 0; i < 500; ++i) odometry.update(0.1, 0.0, 3.0, 0.3, ms(20 * i));
+  EXPECT_EQ(odometry.gyroBias(), 0.0);
+}
+
+TEST(Odometry, UsesKinematicsWithoutAGyro) {
+  Odometry odometry(truck().geometry, 2.0, 0.05);
+  odometry.update(12.0 * kDeg, 0.0, 3.0, std::nullopt, ms(0));
+  EXPECT_NEAR(odometry.motion().yaw_rate, 7.05 * kDeg, 0.02 * kDeg);  // SPECIFICATION 1.0
+}
+
+TEST(Odometry, IntegratesNothingAcrossAClockThatJumped) {
+  Odometry odometry(truck().geometry, 2.0, 0.05);
+  odometry.update(0.0, 0.0, 3.0, 0.0, ms(100000));
+  odometry.forgetTime();
+  odometry.update(0.0, 0.0, 3.0, 0.0, ms(0));
+  EXPECT_EQ(odometry.motion().pose.x, 0.0);
+  odometry.update(0.0, 0.0, 3.0, 0.0, ms(20));
+  EXPECT_NEAR(odometry.motion().pose.x, 0.06, 1e-12);
+}
+
+// ------------------------------------------------------------------------------- steering response
+
+TEST(SteeringResponse, HasDeadTimeThenRampThenLag) {
+  SteeringResponse response(0.15, 15.0 * kDeg, 0.20);
+  response.reset(0.0, ms(0));
+  double at_dead_time = -1.0, at_one_second = -1.0;
+  for (int i = 0; i <= 5000; ++i) {
+    const double angle = response.step(i > 0 ? 20.0 * kDeg : 0.0, ms(i));
+    if (i == 150) at_dead_time = angle;
+    if (i == 1151) at_one_second = angle;
+  }
+  EXPECT_EQ(at_dead_time, 0.0);
+  // A ramp of 15 deg/s lasting 1 s behind a lag of 0.2 s: 15 (1 - 0.2 (1 - e^-5)).
+  EXPECT_NEAR(at_one_second / kDeg, 15.0 * (1.0 - 0.2 * (1.0 - std::exp(-5.0))), 0.05);
+  EXPECT_NEAR(response.step(20.0 * kDeg, ms(5001)), 20.0 * kDeg, 1e-6);
+}
+
+TrackingParameters tracking() {
+  return loadBridge(config::loadFile(configFile("can_bridge.yaml"))).tracking;
+}
+
+TEST(SteeringWatch, AcceptsEveryPumpBetweenIdleAndWorkingSpeed) {
+  for (const double rate : {9.0, 12.0, 15.0}) {
+    SteeringWatch watch(tracking());
+    SteeringResponse plant(0.15, rate * kDeg, 0.2);
+    watch.reset(0.0, ms(0));
+    plant.reset(0.0, ms(0));
+    for (int i = 1; i < 8000; ++i) {
+      const double sent = std::min(15.0e-3 * i, 40.0) * kDeg;
+      watch.step(sent, plant.step(sent, ms(i)), ms(i));
+      ASSERT_LT(watch.error(), 0.01 * kDeg) << rate;
+    }
+  }
+}
+
+TEST(SteeringWatch, FindsAValveThatRunsAway) {
+  SteeringWatch watch(tracking());
+  watch.reset(0.0, ms(0));
+  int failed_at = 0;
+  for (int i = 1; i < 3000 && failed_at == 0; ++i) {
+    watch.step(0.0, -15.0e-3 * i * kDeg, ms(i));
+    if (watch.failed(ms(i))) failed_at = i;
+  }
+  EXPECT_NEAR(failed_at, 834, 3);  // 5 deg at 333 ms, and 500 ms more
+}
+
+TEST(SteeringWatch, ForgivesAnErrorThatPasses) {
+  SteeringWatch watch(tracking());
+  watch.reset(0.0, ms(0));
+  for (int i = 1; i < 5000; ++i) {
+    watch.step(0.0, (i % 500 < 450 ? 6.0 : 4.0) * kDeg, ms(i));
+    ASSERT_FALSE(watch.failed(ms(i))) << i;
+  }
+}
+
+// ------------------------------------------------------------------------------------------ sender
+
+TEST(CommandSender, MakesUpForNothingAfterAGap) {
+  can::MemoryBusHub hub;
+  const auto bus = hub.connect();
+  const auto wire = hub.connect();
+  CommandSender sender(0.02);
+  sender.send({}, {}, {}, *bus, ms(0));
+  EXPECT_FALSE(sender.due(false, ms(19)));
+  EXPECT_TRUE(sender.due(false, ms(20)));
+  sender.send({}, {}, {}, *bus, ms(500));
+  EXPECT_FALSE(sender.due(false, ms(519)));
+  EXPECT_EQ(sender.framesSent(), 6u);
+}
+
+TEST(CommandSender, IsBrokenAfterThreeSetsThatCouldNotBeSent) {
+  can::MemoryBusHub hub;
+  const auto bus = hub.connect();
+  CommandSender sender(0.02);
+  hub.setState(can::BusState::kDown);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_FALSE(sender.broken());
+    sender.send({}, {}, {}, *bus, ms(20 * i));
+  }
+  EXPECT_TRUE(sender.broken());
+  hub.setState(can::BusState::kActive);
+  sender.send({}, {}, {}, *bus, ms(60));
+  EXPECT_FALSE(sender.broken());
+}
+
+TEST(CommandSender, BlocksTheSeventeenthFrameOfAQuarterSecond) {
+  can::MemoryBusHub hub;
+  const auto bus = hub.connect();
+  CommandSender sender(0.02);
+  for (int i = 0; i < 16; ++i) EXPECT_TRUE(sender.send({}, {}, {}, *bus, ms(i)));
+  EXPECT_FALSE(sender.send({}, {}, {}, *bus, ms(250)));
+  EXPECT_TRUE(sender.send({}, {}, {}, *bus, ms(251)));
+  EXPECT_EQ(sender.setsBlocked(), 1u);
+}
+
+// -------------------------------------------------------------------------------------------- link
+
+TEST(TruckLink, NeverTellsAnAgeTooYoung) {
+  can::MemoryBusHub hub;
+  const auto bus = hub.connect(), peer = hub.connect();
+  TruckLink link(0.06);
+  link.receive(*bus, ms(0));
+  EXPECT_TRUE(std::isinf(link.age(ms(0))));
+  peer->send(*can::encode(can::TruckFeedbackFrame()));  // at any time between the two calls
+  peer->send(*can::encode(can::TruckMotionFrame()));
+  peer->send(*can::encode(can::TruckStatusFrame()));
+  EXPECT_TRUE(link.receive(*bus, ms(20)));
+  EXPECT_NEAR(link.age(ms(20)), 0.020, 1e-12);
+  EXPECT_TRUE(link.fresh(ms(60)));
+  EXPECT_FALSE(link.fresh(ms(61)));
+}
+
+TEST(TruckLink, FloodCannotHoldTheBridge) {
+  can::MemoryBusHub hub;
+  const auto bus = hub.connect(), flood = hub.connect();
+  TruckLink link(0.06);
+  can::Frame frame;
+  frame.id = 0x7FF;
+  for (int i = 0; i < 1000; ++i) flood->send(frame);
+  link.receive(*bus, ms(0));
+  EXPECT_EQ(link.framesReceived(), 256u);
+  EXPECT_EQ(link.framesRejected(), 256u);
+}
+
+}  // namespace
+}  // namespace tunnel_pilot::bridge

@@ -1,0 +1,147 @@
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <map>
+#include <regex>
+#include <sstream>
+#include <string>
+
+#include "tunnel_pilot/bridge/safety_state.h"
+#include "tunnel_pilot/can/codec.h"
+#include "tunnel_pilot/supervision/command.h"
+
+// What stands twice, in the code and in a document, must be the same.
+namespace tunnel_pilot::bridge {
+namespace {
+
+std::string read(const std::string& name) {
+  std::ifstream file(std::string(TUNNEL_PILOT_SOURCE_DIR) + "/" + name);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+using ValueTable = std::map<int, std::string>;
+
+ValueTable valueTable(const std::string& frame, const std::string& signal) {
+  const std::string dbc = read("config/tunnel_pilot.dbc");
+  std::smatch line;
+  ValueTable table;
+  if (!std::regex_search(dbc, line, std::regex("\nVAL_ " + frame + " " + signal + " ([^\n]*) ;")))
+    return table;
+  const std::string body = line[1];
+  const std::regex entry("(\\d+) \"([^\"]*)\"");
+  for (std::sregex_iterator i(body.begin(), body.end(), entry), end; i != end; ++i) {
+    table[std::stoi((*i)[1])] = (*i)[2];
+  }
+  return table;
+}
+
+// All numbers of an enumeration that have words.
+template <class Enum>
+ValueTable wordsOf() {
+  ValueTable table;
+  for (int i = 0; i < 256; ++i) {
+    const std::string words = toString(static_cast<Enum>(i));
+    if (words.rfind("unknown", 0) != 0) table[i] = words;
+  }
+  return table;
+}
+
+TEST(Dbc, ValueTablesAreTheEnumerationsOfTheCode) {
+  EXPECT_EQ(valueTable("272", "Mode"), wordsOf<supervision::Mode>());
+  EXPECT_EQ(valueTable("272", "Reason"), wordsOf<supervision::Reason>());
+  EXPECT_EQ(valueTable("274", "Reason"), wordsOf<supervision::Reason>());
+  EXPECT_EQ(valueTable("273", "Source"), wordsOf<supervision::Source>());
+  EXPECT_EQ(valueTable("274", "State"), wordsOf<SafetyState>());
+}
+
+std::string stateList(const std::vector<SafetyState>& states) {
+  std::string list;
+  for (const SafetyState state : states) list += (list.empty() ? "" : ", ") + toString(state);
+  return list;
+}
+
+std::string transitionsAsMarkdown() {
+  std::string table = "| from | event | to | reason |\n|---|---|---|---|\n";
+  for (const Transition& row : transitionTable()) {
+    const std::string reason = row.to == SafetyState::kStopped ? "the stop's"
+                               : row.reason                    ? supervision::toString(*row.reason)
+                                                               : "the command's";
+    table += "| " + stateList(row.from) + " | " + toString(row.event) + " | " + toString(row.to) +
+             " | " + reason + " |\n";
+  }
+  return table;
+}
+
+TEST(CanDocument, DrawsTheTransitionTableOfTheCode) {
+  const std::string table = transitionsAsMarkdown();
+  EXPECT_NE(read("docs/can.md").find(table), std::string::npos) << "docs/can.md must hold:\n" << table;
+}
+
+std::string framesAsMarkdown() {
+  std::ostringstream table;
+  table << "| frame | id | DataId | signal | bits | factor | range | unit "
+           "|\n|---|---|---|---|---|---|---|---|\n";
+  for (const can::FrameLayout& layout : can::frameLayouts()) {
+    for (std::size_t i = 2; i < layout.signals.size(); ++i) {
+      const can::SignalLayout& s = layout.signals[i];
+      std::ostringstream name;
+      name << std::hex << std::uppercase << layout.name << " | 0x" << layout.id << " | 0x"
+           << static_cast<int>(layout.data_id);
+      table << "| " << (i == 2 ? name.str() : " | | ") << " | " << s.name << " | " << s.start << ".."
+            << s.start + s.length - 1 << (s.is_signed ? " signed" : "") << " | " << s.factor << " | ["
+            << s.min << ", " << static_cast<long long>(s.max) << "] | " << s.unit << " |\n";
+    }
+  }
+  return table.str();
+}
+
+TEST(CanDocument, ListsTheFramesOfTheCode) {
+  const std::string table = framesAsMarkdown();
+  EXPECT_NE(read("docs/can.md").find(table), std::string::npos) << "docs/can.md must hold:\n" << table;
+}
+
+// --------------------------------------------------------------------------- the table's own sense
+
+TEST(TransitionTable, HasOneRowForEachStateAndEvent) {
+  std::map<std::pair<SafetyState, Event>, int> rows;
+  for (const Transition& row : transitionTable()) {
+    for (const SafetyState from : row.from) ++rows[{from, row.event}];
+  }
+  for (const auto& [key, count] : rows) {
+    EXPECT_EQ(count, 1) << toString(key.first) << ", " << toString(key.second);
+  }
+}
+
+TEST(TransitionTable, EveryEventIsUsedAndHasAName) {
+  for (int i = 0; i < kEventCount; ++i) {
+    const auto event = static_cast<Event>(i);
+    bool used = false;
+    for (const Transition& row : transitionTable()) used = used || row.event == event;
+    EXPECT_TRUE(used) << toString(event);
+    EXPECT_FALSE(toString(event).empty());
+  }
+}
+
+TEST(TransitionTable, StopsAreLeftOnlyByStandstillAndTheOperatorsReset) {
+  for (int i = 0; i < kEventCount; ++i) {
+    const auto event = static_cast<Event>(i);
+    const Transition* stopping = findTransition(SafetyState::kStopping, event);
+    EXPECT_TRUE(stopping == nullptr || stopping->to == SafetyState::kStopped) << toString(event);
+    const Transition* stopped = findTransition(SafetyState::kStopped, event);
+    EXPECT_EQ(stopped != nullptr, event == Event::kOperatorReset);
+  }
+}
+
+TEST(TransitionTable, DrivingIsReachedOnlyThroughTheOperatorsEngage) {
+  for (const Transition& row : transitionTable()) {
+    EXPECT_EQ(row.to == SafetyState::kArmed, row.event == Event::kEngage) << toString(row.event);
+    for (const SafetyState from : row.from) {
+      EXPECT_TRUE(row.to != SafetyState::kActive || isEngaged(from)) << toString(row.event);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tunnel_pilot::bridge
