@@ -71,8 +71,7 @@ CanBridge::CanBridge(const BridgeParameters& parameters, const vehicle::TruckGeo
       odometry_(truck, parameters.gyro_bias_time, parameters.standstill_speed),
       watch_(parameters.tracking) {}
 
-// ------------------------------------------------------------------------------------ commands and
-// operator
+// -------- commands and operator
 
 std::string CanBridge::whyRefused(const Command& command, Stamp now) const {
   if (!inside(command.articulation_angle, -max_angle_, max_angle_))
@@ -174,8 +173,7 @@ void CanBridge::clockJumped(Stamp now) {
   sendIfDue(now);
 }
 
-// ----------------------------------------------------------------------------------------- what is
-// wrong
+// -------- what is wrong
 
 std::optional<Event> CanBridge::linkFault(Stamp now) const {
   const can::BusState bus = bus_.state();
@@ -227,8 +225,7 @@ std::optional<Event> CanBridge::degradation(Stamp now) const {
   return std::nullopt;
 }
 
-// ------------------------------------------------------------------------------------------- state
-// machine
+// -------- state machine
 
 void CanBridge::raise(Event event, Stamp now) {
   const Transition* row = findTransition(status_.state, event);
@@ -327,8 +324,7 @@ bool CanBridge::standsStill(Stamp now) const {
   return link_.fresh(now) && std::abs(link_.feedback().speed) < parameters_.standstill_speed;
 }
 
-// ----------------------------------------------------------------------------------------- what is
-// sent
+// -------- what is sent
 
 bool CanBridge::commandUsable(Stamp now) const { return !commandFault(now); }
 

@@ -73,8 +73,7 @@ vehicle::PlantInput TruckController::step(const SensedTruck& truck, Stamp now) {
   return out;
 }
 
-// ----------------------------------------------------------------------------------------- what it
-// hears
+// -------- what it hears
 
 void TruckController::receive(Stamp now) {
   while (const std::optional<can::Frame> frame = bus_.receive()) {
@@ -104,8 +103,7 @@ bool TruckController::commandFresh(Stamp now) const {
   return command_received_ && now - *command_received_ <= fromSeconds(parameters_.command_timeout);
 }
 
-// ----------------------------------------------------------------------------------------- what it
-// decides
+// -------- what it decides
 
 bool TruckController::operatorTakesOver() const {
   return std::abs(operator_.steering_wheel - wheel_at_takeover_) > parameters_.override_wheel ||
@@ -156,8 +154,7 @@ void TruckController::decide(const SensedTruck& truck, Stamp now) {
   }
 }
 
-// ----------------------------------------------------------------------------------------- what it
-// does
+// -------- what it does
 
 vehicle::PlantInput TruckController::obey(const SensedTruck& truck, double dt) {
   if (command_.stop) {
@@ -208,8 +205,7 @@ double TruckController::followSpeed(double wanted, double limit, double speed, d
   return given;
 }
 
-// -------------------------------------------------------------------------------------------- what
-// it says
+// -------- what it says
 
 void TruckController::sendFrames(const SensedTruck& truck, Stamp now) {
   if (next_frames_ && now < *next_frames_) return;

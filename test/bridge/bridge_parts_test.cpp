@@ -24,7 +24,7 @@ std::string configFile(const std::string& name) {
 vehicle::TruckParameters truck() { return vehicle::loadTruck(configFile("truck.yaml")); }
 Stamp ms(int milliseconds) { return std::chrono::milliseconds(milliseconds); }
 
-// -------------------------------------------------------------------------------------- parameters
+// -------- parameters
 
 TEST(BridgeParameters, ShippedFileLoads) {
   EXPECT_NO_THROW(loadBridge(config::loadFile(configFile("can_bridge.yaml"))));
@@ -59,7 +59,7 @@ TEST(BridgeParameters, EveryKeyIsNeededAndOfTheRightKind) {
   EXPECT_TRUE(refused(unknown, "typo"));
 }
 
-// ---------------------------------------------------------------------------------------- odometry
+// -------- odometry
 
 TEST(Odometry, FollowsTheTruckThroughAnS) {
   vehicle::KinematicTruck plant(truck());
@@ -122,7 +122,7 @@ TEST(Odometry, IntegratesNothingAcrossAClockThatJumped) {
   EXPECT_NEAR(odometry.motion().pose.x, 0.06, 1e-12);
 }
 
-// ------------------------------------------------------------------------------- steering response
+// -------- steering response
 
 TEST(SteeringResponse, HasDeadTimeThenRampThenLag) {
   SteeringResponse response(0.15, 15.0 * kDeg, 0.20);
@@ -177,7 +177,7 @@ TEST(SteeringWatch, ForgivesAnErrorThatPasses) {
   }
 }
 
-// ------------------------------------------------------------------------------------------ sender
+// -------- sender
 
 TEST(CommandSender, MakesUpForNothingAfterAGap) {
   can::MemoryBusHub hub;
@@ -217,7 +217,7 @@ TEST(CommandSender, BlocksTheSeventeenthFrameOfAQuarterSecond) {
   EXPECT_EQ(sender.setsBlocked(), 1u);
 }
 
-// -------------------------------------------------------------------------------------------- link
+// -------- link
 
 TEST(TruckLink, NeverTellsAnAgeTooYoung) {
   can::MemoryBusHub hub;

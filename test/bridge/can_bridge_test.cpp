@@ -138,7 +138,7 @@ TEST_F(CanBridgeTest, NeverSendsMoreThanSixteenFramesInAQuarterSecond) {
   }
 }
 
-// ---------------------------------------------------------------------------------------- commands
+// -------- commands
 
 class RefusedCommand : public CanBridgeTest,
                        public testing::WithParamInterface<void (*)(Command&, Stamp)> {};
@@ -201,7 +201,7 @@ TEST_F(CanBridgeTest, TakesAnArbiterThatStartedAgainOnlyWhenNotDriving) {
   EXPECT_EQ(rig.judge.last_info->sequence, sent + 1) << "lifted above all before";
 }
 
-// ---------------------------------------------------------------------------------------- stopping
+// -------- stopping
 
 TEST_F(CanBridgeTest, OperatorsStopIsOnTheBusWithinTheCallInEveryState) {
   for (const SafetyState wanted : {SafetyState::kInit, SafetyState::kStandby, SafetyState::kArmed,
@@ -309,8 +309,7 @@ TEST_F(CanBridgeTest, StopsWithinTheTimeThatTheDecelerationAllows) {
   EXPECT_NEAR(toSeconds(rig.now - start), 5.0 / 2.2, 0.2);
 }
 
-// ------------------------------------------------------------------------------------------ random
-// interleavings
+// -------- random interleavings
 
 // Any mixture of faults and requests: the judge finds no unsafe frame, and a stop stays a stop.
 TEST(CanBridgeRandom, NoUnsafeFrameInRandomInterleavings) {

@@ -256,7 +256,7 @@ TEST(WatchdogLatency, WorstOfAllPhasesIsWithinItsLimit) {
   }
 }
 
-// ---------------------------------------------------------------------------------------- DEGRADED
+// -------- DEGRADED
 
 TEST_P(Watchdog, LateMeasurementDegradesAndOneSecondOfHealthRecovers) {
   rig.drive();
@@ -287,8 +287,7 @@ TEST_P(Watchdog, SlowingForAnObstacleIsNoDegradation) {
   EXPECT_EQ(rig.state(), SafetyState::kActive);
 }
 
-// ------------------------------------------------------------------------------------ what is left
-// alone
+// -------- what is left alone
 
 TEST_P(Watchdog, OneLostAndOneCorruptFrameInTenDoNoHarm) {
   rig.drive();

@@ -102,7 +102,7 @@ TEST(CanDocument, ListsTheFramesOfTheCode) {
   EXPECT_NE(read("docs/can.md").find(table), std::string::npos) << "docs/can.md must hold:\n" << table;
 }
 
-// --------------------------------------------------------------------------- the table's own sense
+// -------- the table's own sense
 
 TEST(TransitionTable, HasOneRowForEachStateAndEvent) {
   std::map<std::pair<SafetyState, Event>, int> rows;

@@ -13,7 +13,7 @@ config::Node file(const std::string& name) {
 
 }  // namespace
 
-// ------------------------------------------------------------------------------------------- Judge
+// -------- Judge
 
 void Judge::complain(const std::string& what, Stamp now) {
   complaints.push_back(std::to_string(toSeconds(now)) + " s: " + what);
@@ -59,7 +59,7 @@ void Judge::command(const can::Frame& frame, const BridgeStatus& status, Stamp l
   times.push_back(now);
 }
 
-// --------------------------------------------------------------------------------------------- Rig
+// -------- Rig
 
 BridgeParameters Rig::bridgeParameters() { return loadBridge(file("can_bridge.yaml")); }
 vehicle::TruckParameters Rig::truckParameters() { return vehicle::loadTruck(file("truck.yaml")); }
