@@ -1,0 +1,55 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <ros/node_handle.h>
+#include <sensor_msgs/PointCloud2.h>
+#include <std_srvs/Trigger.h>
+
+#include "tunnel_pilot/ros/clock_watch.h"
+#include "tunnel_pilot/ros/conversions.h"
+#include "tunnel_pilot/ros/diagnostics.h"
+#include "tunnel_pilot/ros/motion_input.h"
+#include "tunnel_pilot/supervision/arbiter.h"
+
+namespace tunnel_pilot::shell {
+
+/// Shell of supervision::Arbiter. Subscribes `lidar_driver/proposal`, `preview_driver/proposal`,
+/// `teleoperation/proposal`, `walls`, `points`, `tunnel_state` with `centerline`, `odom`, `joint_states`, `truck_status`; publishes `command`
+/// and `arbiter_state`. Decides on every proposal and on a timer of 50 Hz (steady time, or simulated time
+/// with use_sim_time), so that silent inputs end in a stop, not in silence. Services ~stop and ~reset
+/// (std_srvs/Trigger) latch a stop and end it, for a truck without can_bridge; with it, use the bridge's.
+/// Parameters: config/arbiter.yaml and `truck_file`. Throws config::ConfigError.
+class ArbiterRos {
+ public:
+  ArbiterRos(ros::NodeHandle nh, ros::NodeHandle private_nh);
+
+ private:
+  template <class Message, class Callback>
+  void listen(ros::NodeHandle& nh, const std::string& topic, Callback callback);
+  void subscribe(ros::NodeHandle& nh);
+  void onProposal(supervision::Source source, const Proposal& message);
+  bool onStop(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
+  bool onReset(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
+  void onPoints(const sensor_msgs::PointCloud2& message);
+  void updateMotion();
+  void updateTunnel();
+  void checkClock();
+  void decide();
+  void fillStatus(Diagnostics::Status& status) const;
+
+  supervision::Arbiter arbiter_;
+  supervision::Decision last_;
+  ClockWatch clock_;
+  MotionInput motion_;
+  TunnelInput tunnel_;
+  ros::Publisher command_publisher_, state_publisher_;
+  std::vector<ros::Subscriber> subscribers_;
+  ros::ServiceServer stop_service_, reset_service_;
+  ros::WallTimer wall_timer_;
+  ros::Timer timer_;
+  Diagnostics diagnostics_;
+};
+
+}  // namespace tunnel_pilot::shell

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "tunnel_pilot/can/bus.h"
+
+namespace tunnel_pilot::shell {
+
+/// A bus whose incoming frames can be counted before their reader takes them: how the simulator in
+/// lockstep sees that the bridge has spoken. At most kQueueLength frames wait; what comes then is lost.
+class BusTap : public can::Bus {
+ public:
+  static constexpr std::size_t kQueueLength = 4096;
+
+  /// `counted` is the identifier to count.
+  BusTap(std::unique_ptr<can::Bus> bus, std::uint32_t counted) : bus_(std::move(bus)), counted_(counted) {}
+
+  bool send(const can::Frame& frame) override { return bus_->send(frame); }
+  std::optional<can::Frame> receive() override;
+  std::uint64_t confirmed() const override { return bus_->confirmed(); }
+  can::BusState state() const override { return bus_->state(); }
+  int descriptor() const override { return bus_->descriptor(); }
+
+  /// Takes in what waits on the bus, and returns how many counted frames have come since the start.
+  std::uint64_t count();
+
+  /// Sleeps until something waits on the bus, at most `milliseconds` of steady time.
+  void wait(int milliseconds) const;
+
+ private:
+  std::unique_ptr<can::Bus> bus_;
+  std::uint32_t counted_;
+  std::deque<can::Frame> waiting_;
+  std::uint64_t count_ = 0;
+};
+
+}  // namespace tunnel_pilot::shell

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <ros/node_handle.h>
+#include <rosgraph_msgs/Clock.h>
+#include <std_srvs/Trigger.h>
+#include <tf2_ros/transform_broadcaster.h>
+#include <tunnel_pilot/TruckCommand.h>
+
+#include "tunnel_pilot/bridge/can_bridge.h"
+#include "tunnel_pilot/can/embedded_bus.h"
+#include "tunnel_pilot/ros/clock_watch.h"
+#include "tunnel_pilot/ros/diagnostics.h"
+
+namespace tunnel_pilot::shell {
+
+/// Shell of bridge::CanBridge on the embedded bus. Subscribes `command`; publishes `joint_states`
+/// (articulation_joint), `odom`, TF odom -> base_link for every feedback of the truck, and `truck_status`
+/// with each of them and at least ten times a second. Services engage, release, stop, reset
+/// (std_srvs/Trigger): the message of a refusal says why.
+///
+/// Time: without use_sim_time a steady timer of 200 Hz ticks the bridge; with it, each message of /clock
+/// does, so that a simulator in lockstep finds the bridge's frames at the same ticks in every run.
+///
+/// Parameters: config/can_bridge.yaml, `truck_file` (path of the truck's YAML) and `bus` (name of the
+/// embedded bus). Throws config::ConfigError, and std::exception when the bus cannot be joined.
+class CanBridgeRos {
+ public:
+  CanBridgeRos(ros::NodeHandle nh, ros::NodeHandle private_nh);
+
+ private:
+  using Trigger = std_srvs::Trigger;
+  using Edge = bridge::CanBridge::Answer (bridge::CanBridge::*)(Stamp);
+
+  void onCommand(const TruckCommand& message);
+  void tick(Stamp now);
+  Stamp current() const;
+  void publishMotion();
+  void publishStatus(Stamp now);
+  void advertiseEdge(ros::NodeHandle& nh, const std::string& name, Edge edge);
+  void fillStatus(Diagnostics::Status& status) const;
+
+  std::unique_ptr<can::Bus> bus_;
+  std::unique_ptr<bridge::CanBridge> bridge_;
+  ClockWatch clock_;
+  Stamp last_tick_{};
+  Stamp published_motion_{};
+  Stamp published_status_{};
+  std::uint32_t told_transitions_ = 0;
+
+  ros::Publisher joint_publisher_, odometry_publisher_, status_publisher_;
+  tf2_ros::TransformBroadcaster transform_broadcaster_;
+  std::vector<ros::ServiceServer> services_;
+  ros::Subscriber command_subscriber_, clock_subscriber_;
+  ros::WallTimer timer_;
+  std::unique_ptr<Diagnostics> diagnostics_;
+};
+
+}  // namespace tunnel_pilot::shell

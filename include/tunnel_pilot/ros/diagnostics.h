@@ -1,0 +1,29 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <ros/node_handle.h>
+
+namespace tunnel_pilot::shell {
+
+/// Tells a stage's condition on /diagnostics once a second of steady time, so that it is told when
+/// simulated time stands still as well. The callback runs in the stage's own callback queue.
+class Diagnostics {
+ public:
+  using Status = diagnostic_updater::DiagnosticStatusWrapper;
+
+  /// `stage` is the noun of the stage; `fill` writes level, message and values.
+  Diagnostics(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, const std::string& stage,
+              std::function<void(Status&)> fill);
+
+  /// Tells it now as well: after a transition.
+  void tell() { updater_.force_update(); }
+
+ private:
+  diagnostic_updater::Updater updater_;
+  ros::WallTimer timer_;
+};
+
+}  // namespace tunnel_pilot::shell

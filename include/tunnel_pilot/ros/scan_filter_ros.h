@@ -1,0 +1,39 @@
+#pragma once
+
+#include <string>
+
+#include <ros/node_handle.h>
+#include <sensor_msgs/LaserScan.h>
+
+#include "tunnel_pilot/perception/scan_filter.h"
+#include "tunnel_pilot/ros/clock_watch.h"
+#include "tunnel_pilot/ros/diagnostics.h"
+#include "tunnel_pilot/ros/sensor_pose.h"
+
+namespace tunnel_pilot::shell {
+
+/// Shell of perception::ScanFilter. Subscribes `scan` (any planar lidar that covers +-90 degrees), needs
+/// TF base_link -> the scan's frame once. Publishes `scan_filtered` (sensor_msgs/LaserScan, the network's
+/// 761 beams, frame of the scan) and `points` (sensor_msgs/PointCloud2 in base_link), both with the scan's
+/// stamp; nothing for a rejected scan, which is logged, counted and told on /diagnostics.
+/// Parameters: config/scan_filter.yaml. Throws config::ConfigError.
+class ScanFilterRos {
+ public:
+  ScanFilterRos(ros::NodeHandle nh, ros::NodeHandle private_nh);
+
+ private:
+  void onScan(const sensor_msgs::LaserScan& message);
+  void publish(const perception::ScanFilter::Result& result, const sensor_msgs::LaserScan& source);
+  void fillStatus(Diagnostics::Status& status) const;
+
+  perception::ScanFilter filter_;
+  SensorPose sensor_pose_;
+  ClockWatch clock_;
+  std::string problem_ = "no scan yet";  // why the last scan was not used; empty when it was
+  ros::Publisher scan_publisher_;
+  ros::Publisher points_publisher_;
+  ros::Subscriber scan_subscriber_;
+  Diagnostics diagnostics_;
+};
+
+}  // namespace tunnel_pilot::shell

@@ -1,0 +1,102 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include <nav_msgs/Odometry.h>
+#include <ros/callback_queue.h>
+#include <ros/node_handle.h>
+#include <std_srvs/SetBool.h>
+#include <std_srvs/Trigger.h>
+#include <tf2_ros/transform_broadcaster.h>
+#include <tunnel_pilot/TruckCommand.h>
+
+#include "tunnel_pilot/drivers/motion_history.h"
+#include "tunnel_pilot/ros/bus_tap.h"
+#include "tunnel_pilot/ros/diagnostics.h"
+#include "tunnel_pilot/simulation/simulator.h"
+
+namespace tunnel_pilot::shell {
+
+/// Holds simulated time back to `factor` times steady time. It never hurries to make up for time lost.
+class Pace {
+ public:
+  /// Sleeps as long as `now` is early. Factor 0: never.
+  void hold(Stamp now, double factor);
+
+ private:
+  double factor_ = -1.0;
+  Stamp simulated_start_{};
+  ros::SteadyTime steady_start_;
+};
+
+/// Shell of simulation::Simulator, stage-like: owns /clock, fixed step, one seed. The pilot gets CAN
+/// frames over the embedded bus and `scan` (frame `laser`, stamped at its first beam, published after the
+/// lidar's latency), and gives frames back; nothing else passes between them.
+/// For people and judges, on topics of its own: `~truth` (tunnel_pilot/SimulatorTruth), `~walls` and
+/// `~obstacles` (visualization_msgs/Marker in map), TF map -> odom (from `odom` and the truth, as a
+/// localisation would). Services ~reset (std_srvs/Trigger: the truck back to its start, at rest; time goes
+/// on) and ~pause (std_srvs/SetBool: time stands still). Contacts of either body are logged and counted.
+///
+/// Lockstep: after each scan time stands still until `command` carries the scan's stamp, and at each
+/// 20 ms until the bridge has sent its frame, but at most 50 ms of steady time, which counts as a miss.
+/// After kMissesAllowed misses in a row, and before the pilot's first answer, it does not wait and runs
+/// no faster than real time. `real_time_factor` holds it back; 0 runs as fast as the pilot answers.
+///
+/// Parameters: config/simulator.yaml, and `truck_file`, `truck_controller_file`, `world_file` (paths),
+/// `bus` (name of the embedded bus), `load` (empty, loaded), `seed`, `reversed` (true: the other way round),
+/// `real_time_factor`. Throws config::ConfigError.
+class SimulatorRos {
+ public:
+  SimulatorRos(ros::NodeHandle nh, ros::NodeHandle private_nh);
+
+  /// Advances by one step, publishes what it brought, waits as told above. Call it again and again.
+  void advance();
+
+ private:
+  static constexpr int kMissesAllowed = 3;
+
+  // Waits for an answer of the pilot, and what came of it.
+  struct Lockstep {
+    bool alive = false;  // answered lately
+    int misses_in_row = 0;
+    unsigned long misses = 0;
+  };
+
+  void configure(const ros::NodeHandle& private_nh);
+  void advertise(ros::NodeHandle& nh, ros::NodeHandle& private_nh);
+  void publishClock();
+  void publishScan(const geometry::Scan& scan);
+  void publishTruth();
+  void publishWalls();
+  void publishObstacles();
+  void onOdometry(const nav_msgs::Odometry& message);
+  bool onReset(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
+  bool onPause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
+  template <class Answered>
+  void await(Lockstep& lockstep, Answered answered);
+  void awaitCommand(Stamp stamp);
+  void awaitBridge();
+  void fillStatus(Diagnostics::Status& status);
+
+  ros::CallbackQueue queue_;
+  std::unique_ptr<BusTap> bus_;
+  std::unique_ptr<simulation::Simulator> simulator_;
+  double scan_period_ = 0.0;       // [s]
+  double real_time_factor_ = 1.0;
+  bool paused_ = false;
+  Pace pace_;
+  Lockstep command_lockstep_, bridge_lockstep_;
+  Stamp command_stamp_{};          // of the newest `command`
+  std::uint64_t bridge_frames_ = 0;  // at the last wait
+  drivers::MotionHistory true_motion_;
+
+  ros::Publisher clock_publisher_, scan_publisher_, truth_publisher_, walls_publisher_,
+      obstacles_publisher_;
+  ros::Subscriber command_subscriber_, odometry_subscriber_;
+  ros::ServiceServer reset_service_, pause_service_;
+  tf2_ros::TransformBroadcaster transform_broadcaster_;
+  std::unique_ptr<Diagnostics> diagnostics_;
+};
+
+}  // namespace tunnel_pilot::shell

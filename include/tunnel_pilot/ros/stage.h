@@ -1,0 +1,42 @@
+#pragma once
+
+#include <exception>
+#include <memory>
+#include <string>
+
+#include <nodelet/nodelet.h>
+#include <ros/ros.h>
+
+namespace tunnel_pilot::shell {
+
+/// A stage as nodelet: its callbacks run one at a time (single-threaded queue of the manager). A stage
+/// that refuses its parameters is not loaded; the log says why.
+template <class Stage>
+class StageNodelet : public nodelet::Nodelet {
+  void onInit() override {
+    try {
+      stage_ = std::make_unique<Stage>(getNodeHandle(), getPrivateNodeHandle());
+    } catch (const std::exception& e) {
+      NODELET_FATAL("%s", e.what());
+      throw;
+    }
+  }
+
+  std::unique_ptr<Stage> stage_;
+};
+
+/// A stage as a node of its own. Exit status 1 when it refuses its parameters; the log says why.
+template <class Stage>
+int runStage(int argc, char** argv, const std::string& name) {
+  ros::init(argc, argv, name);
+  try {
+    Stage stage{ros::NodeHandle(), ros::NodeHandle("~")};
+    ros::spin();
+  } catch (const std::exception& e) {
+    ROS_FATAL("%s", e.what());
+    return 1;
+  }
+  return 0;
+}
+
+}  // namespace tunnel_pilot::shell

@@ -1,0 +1,123 @@
+#include "tunnel_pilot/ros/can_bridge_ros.h"
+
+#include <ros/console.h>
+
+#include "tunnel_pilot/ros/conversions.h"
+#include "tunnel_pilot/ros/parameters.h"
+
+namespace tunnel_pilot::shell {
+namespace {
+
+constexpr double kTickPeriod = 0.005;                           // [s] steady time
+constexpr Stamp kStatusPeriod = std::chrono::milliseconds(100);
+
+}  // namespace
+
+CanBridgeRos::CanBridgeRos(ros::NodeHandle nh, ros::NodeHandle private_nh) {
+  Parameters parameters(private_nh);
+  const auto truck = takeTruck(parameters);
+  const std::string bus = parameters.take({"bus"}).text("bus");
+  const auto bridge_parameters = bridge::loadBridge(parameters.rest());
+  bus_ = std::make_unique<can::EmbeddedBus>(bus);
+  bridge_ = std::make_unique<bridge::CanBridge>(bridge_parameters, truck.geometry, *bus_);
+
+  joint_publisher_ = nh.advertise<sensor_msgs::JointState>("joint_states", 5);
+  odometry_publisher_ = nh.advertise<nav_msgs::Odometry>("odom", 5);
+  status_publisher_ = nh.advertise<TruckStatus>("truck_status", 5);
+  diagnostics_ = std::make_unique<Diagnostics>(nh, private_nh, "can_bridge",
+                                               [this](auto& status) { fillStatus(status); });
+  advertiseEdge(nh, "engage", &bridge::CanBridge::engage);
+  advertiseEdge(nh, "release", &bridge::CanBridge::release);
+  advertiseEdge(nh, "stop", &bridge::CanBridge::stop);
+  advertiseEdge(nh, "reset", &bridge::CanBridge::reset);
+  const auto hints = ros::TransportHints().tcpNoDelay();
+  command_subscriber_ = nh.subscribe("command", 1, &CanBridgeRos::onCommand, this, hints);
+  if (ros::Time::isSimTime()) {
+    clock_subscriber_ = nh.subscribe<rosgraph_msgs::Clock>(
+        "/clock", 10, [this](const rosgraph_msgs::Clock::ConstPtr& m) { tick(toCore(m->clock)); },
+        ros::VoidConstPtr(), hints);
+  } else {
+    timer_ = nh.createWallTimer(ros::WallDuration(kTickPeriod),
+                                [this](const ros::WallTimerEvent&) { tick(now()); });
+  }
+}
+
+void CanBridgeRos::advertiseEdge(ros::NodeHandle& nh, const std::string& name, Edge edge) {
+  const auto serve = [this, name, edge](Trigger::Request&, Trigger::Response& response) {
+    const auto answer = (bridge_.get()->*edge)(current());
+    response.success = answer.accepted;
+    response.message = answer.reason;
+    ROS_INFO("can_bridge: %s %s %s", name.c_str(), answer.accepted ? "accepted" : "refused:",
+             answer.reason.c_str());
+    return true;
+  };
+  services_.push_back(nh.advertiseService<Trigger::Request, Trigger::Response>(
+      name, boost::function<bool(Trigger::Request&, Trigger::Response&)>(serve)));
+}
+
+void CanBridgeRos::onCommand(const TruckCommand& message) {
+  bridge_->setCommand(toCore(message), current());
+}
+
+Stamp CanBridgeRos::current() const { return ros::Time::isSimTime() ? last_tick_ : now(); }
+
+void CanBridgeRos::tick(Stamp now) {
+  if (clock_.jumped(toRos(now), ros::SteadyTime::now(), ros::Time::isSimTime())) {
+    ROS_ERROR("can_bridge: the clock jumped");
+    bridge_->clockJumped(now);
+    published_status_ = Stamp{};
+  }
+  last_tick_ = now;
+  bridge_->tick(now);
+  if (bridge_->motion().stamp != published_motion_) {
+    publishMotion();
+    publishStatus(now);
+  } else if (now - published_status_ >= kStatusPeriod) {
+    publishStatus(now);
+  }
+  const auto& status = bridge_->status();
+  if (status.transitions == told_transitions_) return;
+  told_transitions_ = status.transitions;
+  ROS_INFO("can_bridge: %s: %s", toString(status.state).c_str(), toString(status.reason).c_str());
+  diagnostics_->tell();
+}
+
+void CanBridgeRos::publishMotion() {
+  const auto& motion = bridge_->motion();
+  published_motion_ = motion.stamp;
+  joint_publisher_.publish(toJointState(motion));
+  const auto odometry = toOdometry(motion);
+  odometry_publisher_.publish(odometry);
+  geometry_msgs::TransformStamped transform;
+  transform.header = odometry.header;
+  transform.child_frame_id = odometry.child_frame_id;
+  transform.transform.translation.x = motion.pose.x;
+  transform.transform.translation.y = motion.pose.y;
+  transform.transform.rotation = odometry.pose.pose.orientation;
+  transform_broadcaster_.sendTransform(transform);
+}
+
+void CanBridgeRos::publishStatus(Stamp now) {
+  published_status_ = now;
+  status_publisher_.publish(toRos(bridge_->status(), now));
+}
+
+void CanBridgeRos::fillStatus(Diagnostics::Status& status) const {
+  const auto& s = bridge_->status();
+  const std::string words = toString(s.state) + ": " + toString(s.reason);
+  const bool stop = bridge::isStop(s.state);
+  const bool driving = s.state == bridge::SafetyState::kActive;
+  status.summary(stop ? Diagnostics::Status::ERROR
+                      : driving ? Diagnostics::Status::OK : Diagnostics::Status::WARN, words);
+  status.add("feedback age [s]", s.feedback_age);
+  status.add("command age [s]", s.command_age);
+  status.add("tracking error [rad]", s.tracking_error);
+  status.add("fault bits", s.faults);
+  status.add("frames received", s.frames_received);
+  status.add("frames rejected", s.frames_rejected);
+  status.add("frames sent", s.frames_sent);
+  status.add("commands rejected", s.commands_rejected);
+  status.add("last command rejection", s.command_rejection);
+}
+
+}  // namespace tunnel_pilot::shell

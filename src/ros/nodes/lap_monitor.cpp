@@ -1,0 +1,19 @@
+#include "tunnel_pilot/ros/lap_monitor.h"
+
+#include <cstdio>
+#include <exception>
+
+#include <ros/ros.h>
+
+// Exit status 0: the lap passed. 1: it failed, or the parameters were refused.
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "lap_monitor");
+  try {
+    tunnel_pilot::shell::LapMonitor monitor{ros::NodeHandle(), ros::NodeHandle("~")};
+    ros::spin();
+    return monitor.passed().value_or(false) ? 0 : 1;
+  } catch (const std::exception& e) {
+    ROS_FATAL("%s", e.what());
+    return 1;
+  }
+}

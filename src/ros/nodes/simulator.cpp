@@ -1,0 +1,17 @@
+#include "tunnel_pilot/ros/simulator_ros.h"
+
+#include <exception>
+
+#include <ros/ros.h>
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "simulator");
+  try {
+    tunnel_pilot::shell::SimulatorRos simulator{ros::NodeHandle(), ros::NodeHandle("~")};
+    while (ros::ok()) simulator.advance();
+  } catch (const std::exception& e) {
+    ROS_FATAL("%s", e.what());
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,64 @@
+#include "tunnel_pilot/ros/scan_filter_ros.h"
+
+#include <boost/make_shared.hpp>
+#include <ros/console.h>
+
+#include "tunnel_pilot/ros/conversions.h"
+#include "tunnel_pilot/ros/parameters.h"
+
+namespace tunnel_pilot::shell {
+
+using perception::ScanFilter;
+
+ScanFilterRos::ScanFilterRos(ros::NodeHandle nh, ros::NodeHandle private_nh)
+    : filter_(perception::loadScanFilter(Parameters(private_nh).rest())),
+      scan_publisher_(nh.advertise<sensor_msgs::LaserScan>("scan_filtered", 1)),
+      points_publisher_(nh.advertise<sensor_msgs::PointCloud2>("points", 1)),
+      scan_subscriber_(nh.subscribe("scan", 1, &ScanFilterRos::onScan, this,
+                                    ros::TransportHints().tcpNoDelay())),
+      diagnostics_(nh, private_nh, "scan_filter", [this](auto& status) { fillStatus(status); }) {}
+
+void ScanFilterRos::onScan(const sensor_msgs::LaserScan& message) {
+  if (clock_.jumped()) {
+    ROS_WARN("scan_filter: the clock jumped, starting anew");
+    filter_.reset();
+  }
+  const auto sensor = sensor_pose_.find(message.header.frame_id);
+  if (!sensor) {
+    problem_ = sensor_pose_.whyNot();
+    ROS_ERROR_THROTTLE(1.0, "scan_filter: %s", problem_.c_str());
+    return;
+  }
+  const auto& result = filter_.filter(toCore(message), *sensor, now());
+  if (result.accepted) {
+    problem_.clear();
+    publish(result, message);
+    return;
+  }
+  problem_ = "scan rejected: " + toString(result.rejection);
+  ROS_WARN_THROTTLE(1.0, "scan_filter: %s", problem_.c_str());
+}
+
+void ScanFilterRos::publish(const ScanFilter::Result& result, const sensor_msgs::LaserScan& source) {
+  auto scan = toRos(result.network_scan, source.header.frame_id);
+  scan.scan_time = source.scan_time;
+  points_publisher_.publish(
+      boost::make_shared<sensor_msgs::PointCloud2>(toRos(*result.points, toCore(source.header.stamp))));
+  scan_publisher_.publish(boost::make_shared<sensor_msgs::LaserScan>(std::move(scan)));
+}
+
+void ScanFilterRos::fillStatus(Diagnostics::Status& status) const {
+  if (problem_.empty()) {
+    status.summary(Diagnostics::Status::OK, "scans accepted");
+  } else {
+    status.summary(Diagnostics::Status::ERROR, problem_);
+  }
+  status.add("accepted", filter_.accepted());
+  status.add("rejected", filter_.rejected());
+  for (std::size_t i = 1; i < ScanFilter::kRejections; ++i) {
+    const auto rejection = static_cast<ScanFilter::Rejection>(i);
+    if (filter_.count(rejection) > 0) status.add(toString(rejection), filter_.count(rejection));
+  }
+}
+
+}  // namespace tunnel_pilot::shell

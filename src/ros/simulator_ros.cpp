@@ -1,0 +1,294 @@
+#include "tunnel_pilot/ros/simulator_ros.h"
+
+#include <cmath>
+
+#include <ros/console.h>
+#include <rosgraph_msgs/Clock.h>
+#include <tunnel_pilot/SimulatorTruth.h>
+#include <visualization_msgs/Marker.h>
+
+#include "tunnel_pilot/can/embedded_bus.h"
+#include "tunnel_pilot/can/layout.h"
+#include "tunnel_pilot/ros/conversions.h"
+#include "tunnel_pilot/ros/parameters.h"
+
+namespace tunnel_pilot::shell {
+namespace {
+
+constexpr Stamp kClockPeriod = std::chrono::milliseconds(10);
+constexpr Stamp kFramePeriod = std::chrono::milliseconds(20);
+constexpr Stamp kObstaclePeriod = std::chrono::milliseconds(200);
+constexpr double kLongestWait = 0.05;  // [s] steady time
+constexpr double kWallHeight = 1.5;    // of the pictured walls [m]
+
+// True when the step from `before` to `now` reached another multiple of the period.
+bool isDue(Stamp before, Stamp now, Stamp period) { return before / period != now / period; }
+
+visualization_msgs::Marker lines(const std::string& ns, float red, float green, float blue, float alpha) {
+  visualization_msgs::Marker marker;
+  marker.header.frame_id = kMapFrame;
+  marker.ns = ns;
+  marker.type = visualization_msgs::Marker::LINE_LIST;
+  marker.pose.orientation.w = 1.0;
+  marker.scale.x = 0.06;
+  marker.color.r = red;
+  marker.color.g = green;
+  marker.color.b = blue;
+  marker.color.a = alpha;
+  return marker;
+}
+
+void addChain(const world::WallChain& chain, double height, visualization_msgs::Marker& marker) {
+  for (std::size_t i = 0; i + 1 < chain.size(); ++i) {
+    for (const auto& point : {chain[i], chain[i + 1]}) {
+      geometry_msgs::Point p;
+      p.x = point.x();
+      p.y = point.y();
+      p.z = height;
+      marker.points.push_back(p);
+    }
+  }
+}
+
+SimulatorTruth toMessage(const simulation::Truth& truth, double lap_length) {
+  SimulatorTruth message;
+  message.header.stamp = toRos(truth.stamp);
+  message.header.frame_id = kMapFrame;
+  message.pose.x = truth.state.pose.x;
+  message.pose.y = truth.state.pose.y;
+  message.pose.theta = truth.state.pose.heading;
+  message.articulation = truth.state.articulation;
+  message.speed = truth.state.speed;
+  message.lateral_speed = truth.state.lateral_speed;
+  message.yaw_rate = truth.state.yaw_rate;
+  message.on_design_line = truth.on_design_line;
+  message.station = truth.station;
+  message.lateral_offset = truth.lateral_offset;
+  message.heading_error = truth.heading_error;
+  message.curvature = truth.curvature;
+  message.lap_length = lap_length;
+  message.clearance = truth.clearance;
+  message.contacts = truth.contacts;
+  return message;
+}
+
+}  // namespace
+
+void Pace::hold(Stamp now, double factor) {
+  if (factor <= 0.0) {
+    factor_ = -1.0;
+    return;
+  }
+  const ros::SteadyTime steady = ros::SteadyTime::now();
+  const double early = toSeconds(now - simulated_start_) / factor - (steady - steady_start_).toSec();
+  if (factor != factor_ || early < -0.1 || early > 1.0) {  // a new factor, or time was lost: start here
+    factor_ = factor;
+    simulated_start_ = now;
+    steady_start_ = steady;
+  } else if (early > 0.0) {
+    ros::WallDuration(early).sleep();
+  }
+}
+
+SimulatorRos::SimulatorRos(ros::NodeHandle nh, ros::NodeHandle private_nh) {
+  nh.setCallbackQueue(&queue_);
+  private_nh.setCallbackQueue(&queue_);
+  configure(private_nh);
+  advertise(nh, private_nh);
+  publishWalls();
+}
+
+void SimulatorRos::configure(const ros::NodeHandle& private_nh) {
+  Parameters parameters(private_nh);
+  const auto truck = takeTruck(parameters);
+  config::Node own = parameters.take({"truck_controller_file", "world_file", "bus", "load", "seed",
+                                      "reversed", "real_time_factor"});
+  const auto controller =
+      simulation::loadTruckController(config::loadFile(own.text("truck_controller_file")));
+  real_time_factor_ = own.number("real_time_factor", "1", 0.0, 1000.0);
+  const auto seed = static_cast<std::uint64_t>(own.integer("seed", "1", 0, 1 << 30));
+  const bool loaded = own.choice("load", {"empty", "loaded"}) == "loaded";
+  world::WorldOptions options;
+  options.seed = seed;
+  options.reversed = own.boolean("reversed");
+  auto world = world::loadWorld(own.text("world_file"), options);
+  bus_ = std::make_unique<BusTap>(std::make_unique<can::EmbeddedBus>(own.text("bus")), can::kTpCommandId);
+  own.finish();
+
+  const auto simulator = simulation::loadSimulator(parameters.rest());
+  scan_period_ = 1.0 / simulator.lidar.rate;
+  const auto load = loaded ? vehicle::Load::kLoaded : vehicle::Load::kEmpty;
+  const simulation::PlantChoice plant{simulation::PlantModel::kDynamic, load, true, 0.0};
+  simulator_ = std::make_unique<simulation::Simulator>(
+      simulator, controller, truck, simulation::makePlant(plant, truck, seed), load, std::move(world), seed,
+      *bus_);
+  simulator_->place(simulator_->startPose());
+}
+
+void SimulatorRos::advertise(ros::NodeHandle& nh, ros::NodeHandle& private_nh) {
+  clock_publisher_ = nh.advertise<rosgraph_msgs::Clock>("/clock", 10);
+  scan_publisher_ = nh.advertise<sensor_msgs::LaserScan>("scan", 2);
+  truth_publisher_ = private_nh.advertise<SimulatorTruth>("truth", 50);
+  walls_publisher_ = private_nh.advertise<visualization_msgs::Marker>("walls", 1, true);
+  obstacles_publisher_ = private_nh.advertise<visualization_msgs::Marker>("obstacles", 1);
+  const auto hints = ros::TransportHints().tcpNoDelay();
+  command_subscriber_ = nh.subscribe<TruckCommand>(
+      "command", 10,
+      [this](const TruckCommand::ConstPtr& m) { command_stamp_ = toCore(m->header.stamp); },
+      ros::VoidConstPtr(), hints);
+  odometry_subscriber_ = nh.subscribe("odom", 10, &SimulatorRos::onOdometry, this, hints);
+  reset_service_ = private_nh.advertiseService("reset", &SimulatorRos::onReset, this);
+  pause_service_ = private_nh.advertiseService("pause", &SimulatorRos::onPause, this);
+  diagnostics_ = std::make_unique<Diagnostics>(nh, private_nh, "simulator",
+                                               [this](auto& status) { fillStatus(status); });
+}
+
+void SimulatorRos::advance() {
+  if (paused_) {
+    queue_.callAvailable(ros::WallDuration(0.01));
+    return;
+  }
+  const Stamp before = simulator_->now();
+  const auto& events = simulator_->step();
+  const Stamp now = simulator_->now();
+  if (events.truth) publishTruth();
+  if (events.contact) {
+    ROS_ERROR("simulator: the %s body touched something", events.contact->front ? "front" : "rear");
+  }
+  const bool clock_due = isDue(before, now, kClockPeriod);
+  if (clock_due || events.scan) publishClock();
+  if (events.scan) {
+    publishScan(*events.scan);
+    awaitCommand(events.scan->stamp);
+  }
+  if (isDue(before, now, kFramePeriod)) awaitBridge();
+  if (isDue(before, now, kObstaclePeriod)) publishObstacles();
+  if (!clock_due) return;
+  const bool lockstep = command_lockstep_.alive && bridge_lockstep_.alive;
+  pace_.hold(now, lockstep || (real_time_factor_ > 0.0 && real_time_factor_ < 1.0) ? real_time_factor_ : 1.0);
+  queue_.callAvailable();
+}
+
+// Lets the pilot answer. An answer that comes without having been waited for brings the lockstep back.
+template <class Answered>
+void SimulatorRos::await(Lockstep& lockstep, Answered answered) {
+  const ros::SteadyTime start = ros::SteadyTime::now();
+  while (!answered()) {
+    if (!lockstep.alive) return;
+    if ((ros::SteadyTime::now() - start).toSec() > kLongestWait) {
+      ++lockstep.misses;
+      lockstep.alive = ++lockstep.misses_in_row < kMissesAllowed;
+      return;
+    }
+  }
+  lockstep.misses_in_row = 0;
+  lockstep.alive = true;
+}
+
+void SimulatorRos::awaitCommand(Stamp stamp) {
+  // Without lockstep, the answer to the scan before is already a sign of life.
+  const Stamp least = command_lockstep_.alive ? stamp : stamp - 2 * fromSeconds(scan_period_);
+  await(command_lockstep_, [&] {
+    queue_.callAvailable(ros::WallDuration(command_lockstep_.alive ? 0.002 : 0.0));
+    return command_stamp_ >= least && command_stamp_ > Stamp::zero();
+  });
+}
+
+void SimulatorRos::awaitBridge() {
+  await(bridge_lockstep_, [&] {
+    if (bus_->count() > bridge_frames_) return true;
+    if (bridge_lockstep_.alive) bus_->wait(2);
+    return bus_->count() > bridge_frames_;
+  });
+  bridge_frames_ = bus_->count();
+}
+
+void SimulatorRos::publishClock() {
+  rosgraph_msgs::Clock clock;
+  clock.clock = toRos(simulator_->now());
+  clock_publisher_.publish(clock);
+}
+
+void SimulatorRos::publishScan(const geometry::Scan& scan) {
+  auto message = toRos(scan, "laser");
+  message.scan_time = static_cast<float>(scan_period_);
+  scan_publisher_.publish(message);
+}
+
+void SimulatorRos::publishTruth() {
+  const auto& truth = simulator_->truth();
+  truth_publisher_.publish(toMessage(truth, simulator_->world().design_line.length()));
+  drivers::Motion motion;
+  motion.stamp = truth.stamp;
+  motion.pose = truth.state.pose;
+  motion.speed = truth.state.speed;
+  motion.yaw_rate = truth.state.yaw_rate;
+  true_motion_.add(motion);
+}
+
+void SimulatorRos::publishWalls() {
+  auto marker = lines("true_walls", 0.55F, 0.55F, 0.6F, 0.35F);
+  for (const auto& chain : simulator_->world().walls) {
+    addChain(chain, 0.0, marker);
+    addChain(chain, kWallHeight, marker);
+  }
+  walls_publisher_.publish(marker);
+}
+
+void SimulatorRos::publishObstacles() {
+  const auto& obstacles = simulator_->world().obstacles;
+  if (obstacles.empty() || obstacles_publisher_.getNumSubscribers() == 0) return;
+  auto marker = lines("obstacles", 0.9F, 0.3F, 0.3F, 0.8F);
+  for (const auto& obstacle : obstacles) {
+    addChain(obstacle.chainAt(toSeconds(simulator_->now())), kWallHeight, marker);
+  }
+  obstacles_publisher_.publish(marker);
+}
+
+// What a localisation would tell: where odom lies in the map, by the true pose at the odometry's stamp.
+void SimulatorRos::onOdometry(const nav_msgs::Odometry& message) {
+  const auto true_pose = true_motion_.poseAt(toCore(message.header.stamp));
+  const geometry::Pose odom = toCore(message.pose.pose);
+  if (!true_pose || !std::isfinite(odom.x + odom.y + odom.heading)) return;
+  const geometry::Pose odom_in_map = true_pose->compose(odom.relative(geometry::Pose()));
+  const auto pose = toRos(odom_in_map);
+  geometry_msgs::TransformStamped transform;
+  transform.header.stamp = message.header.stamp;
+  transform.header.frame_id = kMapFrame;
+  transform.child_frame_id = kOdomFrame;
+  transform.transform.translation.x = pose.position.x;
+  transform.transform.translation.y = pose.position.y;
+  transform.transform.rotation = pose.orientation;
+  transform_broadcaster_.sendTransform(transform);
+}
+
+bool SimulatorRos::onReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+  simulator_->place(simulator_->startPose());
+  true_motion_.clear();
+  response.success = true;
+  response.message = "the truck stands at its start";
+  return true;
+}
+
+bool SimulatorRos::onPause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response) {
+  paused_ = request.data;
+  response.success = true;
+  response.message = paused_ ? "time stands still" : "time goes on";
+  return true;
+}
+
+void SimulatorRos::fillStatus(Diagnostics::Status& status) {
+  const auto& truth = simulator_->truth();
+  const bool lockstep = command_lockstep_.alive && bridge_lockstep_.alive;
+  if (truth.contacts > 0) {
+    status.summary(Diagnostics::Status::ERROR, "a body touched something");
+  } else {
+    status.summary(Diagnostics::Status::OK, paused_ ? "paused" : lockstep ? "in lockstep" : "in real time");
+  }
+  status.add("time [s]", toSeconds(simulator_->now()));
+  status.add("contacts", truth.contacts);
+  status.add("scans not answered in time", command_lockstep_.misses);
+  status.add("frames not sent in time", bridge_lockstep_.misses);
+}
+
+}  // namespace tunnel_pilot::shell

@@ -1,0 +1,291 @@
+// What the shells do without a ROS master: conversions, parameter trees, clocks, pairing of topics.
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "tunnel_pilot/can/memory_bus.h"
+#include "tunnel_pilot/ros/bus_tap.h"
+#include "tunnel_pilot/ros/clock_watch.h"
+#include "tunnel_pilot/ros/conversions.h"
+#include "tunnel_pilot/ros/motion_input.h"
+#include "tunnel_pilot/ros/parameters.h"
+#include "tunnel_pilot/ros/sensor_pose.h"
+
+namespace tunnel_pilot::shell {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+config::Node nodeOf(const XmlRpc::XmlRpcValue& tree) { return {toYaml(tree, "here"), "here"}; }
+
+XmlRpc::XmlRpcValue tree(const XmlRpc::XmlRpcValue& value) {
+  XmlRpc::XmlRpcValue map;
+  map["key"] = value;
+  return map;
+}
+
+TEST(ParameterTree, WholeNumberPassesForANumber) {
+  EXPECT_EQ(3.0, nodeOf(tree(3)).number("key", "m", 0.0, 10.0));
+}
+
+TEST(ParameterTree, NumberKeepsAllItsDigits) {
+  const double value = 0.1 + 1e-15;
+  EXPECT_EQ(value, nodeOf(tree(value)).number("key", "m", 0.0, 10.0));
+}
+
+TEST(ParameterTree, NumberWithoutFractionIsNoWholeNumber) {
+  EXPECT_THROW(nodeOf(tree(3.0)).integer("key", "1", 0, 10), config::ConfigError);
+}
+
+TEST(ParameterTree, TextOfDigitsIsNoNumber) {
+  EXPECT_THROW(nodeOf(tree("3")).number("key", "m", 0.0, 10.0), config::ConfigError);
+}
+
+TEST(ParameterTree, NumberIsNoFlag) {
+  EXPECT_THROW(nodeOf(tree(1)).boolean("key"), config::ConfigError);
+}
+
+TEST(ParameterTree, NanIsRefused) {
+  EXPECT_THROW(nodeOf(tree(kNan)).number("key", "m", 0.0, 10.0), config::ConfigError);
+}
+
+TEST(ParameterTree, ListsAndMapsNest) {
+  XmlRpc::XmlRpcValue inner;
+  inner[0]["name"] = "first";
+  inner[1]["name"] = "second";
+  auto children = nodeOf(tree(inner)).children("key");
+  ASSERT_EQ(2u, children.size());
+  EXPECT_EQ("second", children[1].text("name"));
+}
+
+TEST(Stamps, PassToTheNanosecond) {
+  const ros::Time time(1700000000, 123456789);
+  EXPECT_EQ(time, toRos(toCore(time)));
+  EXPECT_EQ(1700000000123456789LL, toCore(time).count());
+}
+
+TEST(Conversions, ScanComesBackUnchanged) {
+  sensor_msgs::LaserScan message;
+  message.header.stamp = ros::Time(5, 7);
+  message.angle_min = -1.5F;
+  message.angle_increment = 0.01F;
+  message.range_max = 30.0F;
+  message.ranges = {1.0F, std::numeric_limits<float>::infinity(), 2.5F};
+  const auto back = toRos(toCore(message), "laser");
+  EXPECT_EQ(message.header.stamp, back.header.stamp);
+  EXPECT_EQ(message.angle_min, back.angle_min);
+  EXPECT_EQ(message.angle_increment, back.angle_increment);
+  EXPECT_EQ(message.ranges, back.ranges);
+}
+
+TEST(Conversions, PathKeepsItsCurvatureThroughAMessage) {
+  const auto path = geometry::buildPath({{10.0, 0.0, 0.08}, {10.0, 0.08, 0.08}}, {1.0, 2.0, 0.3}, 0.5);
+  const auto back = toCore(toRos(path, Stamp{}));
+  for (const double s : {2.0, 5.0, 9.0, 15.0, 19.0}) {
+    EXPECT_NEAR(path.at(s).curvature, back.at(s).curvature, 1e-3) << s;
+    EXPECT_NEAR(path.at(s).heading, back.at(s).heading, 1e-4) << s;
+  }
+  EXPECT_NEAR(path.length(), back.length(), 2e-3);
+}
+
+TEST(Conversions, PathThatIsNoneIsEmpty) {
+  nav_msgs::Path message = toRos(geometry::buildPath({{2.0, 0.0, 0.0}}, {}, 0.5), Stamp{});
+  nav_msgs::Path broken = message;
+  broken.poses[1].pose.position.x = kNan;
+  EXPECT_TRUE(toCore(broken).empty());
+  broken = message;
+  broken.poses[1] = broken.poses[0];
+  EXPECT_TRUE(toCore(broken).empty());
+  broken.poses.resize(1);
+  EXPECT_TRUE(toCore(broken).empty());
+}
+
+TEST(Conversions, CloudComesBackUnchanged) {
+  pcl::PointCloud<pcl::PointXYZ> cloud;
+  cloud.push_back({1.0F, 2.0F, 0.0F});
+  cloud.push_back({3.0F, -4.0F, 0.0F});
+  const auto back = toCore(toRos(cloud, std::chrono::seconds(1)));
+  ASSERT_NE(nullptr, back);
+  ASSERT_EQ(2u, back->size());
+  EXPECT_EQ(-4.0F, back->points[1].y);
+}
+
+TEST(Conversions, CloudThatAnnouncesMoreThanItHoldsIsRefused) {
+  pcl::PointCloud<pcl::PointXYZ> cloud;
+  cloud.push_back({1.0F, 2.0F, 0.0F});
+  auto message = toRos(cloud, Stamp{});
+  message.width = 1000000;
+  EXPECT_EQ(nullptr, toCore(message));
+  message = toRos(cloud, Stamp{});
+  message.fields.clear();
+  EXPECT_EQ(nullptr, toCore(message));
+}
+
+TEST(Conversions, CommandComesBackUnchanged) {
+  supervision::Command command;
+  command.stamp = std::chrono::nanoseconds(123456789);
+  command.sequence = 42;
+  command.articulation_angle = -0.3;
+  command.speed = 2.5;
+  command.acceleration = 0.7;
+  command.stop = true;
+  command.mode = supervision::Mode::kAutonomous;
+  command.source = supervision::Source::kPreviewDriver;
+  command.reason = supervision::Reason::kObstacle;
+  const auto back = toCore(toRos(command));
+  EXPECT_EQ(command.stamp, back.stamp);
+  EXPECT_EQ(command.sequence, back.sequence);
+  EXPECT_EQ(command.articulation_angle, back.articulation_angle);
+  EXPECT_EQ(command.speed, back.speed);
+  EXPECT_EQ(command.acceleration, back.acceleration);
+  EXPECT_EQ(command.stop, back.stop);
+  EXPECT_EQ(command.mode, back.mode);
+  EXPECT_EQ(command.source, back.source);
+  EXPECT_EQ(command.reason, back.reason);
+}
+
+TEST(ClockWatch, SimulatedTimeThatFlowsIsNoJump) {
+  ClockWatch watch;
+  EXPECT_FALSE(watch.jumped(ros::Time(0), ros::SteadyTime(1), true));
+  EXPECT_FALSE(watch.jumped(ros::Time(500), ros::SteadyTime(2), true));  // time begins
+  EXPECT_FALSE(watch.jumped(ros::Time(500.9), ros::SteadyTime(2), true));
+  EXPECT_FALSE(watch.jumped(ros::Time(500.9), ros::SteadyTime(90), true));
+}
+
+TEST(ClockWatch, SimulatedTimeThatStepsBackJumps) {
+  ClockWatch watch;
+  watch.jumped(ros::Time(10), ros::SteadyTime(1), true);
+  EXPECT_TRUE(watch.jumped(ros::Time(9.99), ros::SteadyTime(1.1), true));
+  EXPECT_FALSE(watch.jumped(ros::Time(10.01), ros::SteadyTime(1.2), true));
+}
+
+TEST(ClockWatch, SimulatedTimeThatLeapsAheadJumps) {
+  ClockWatch watch;
+  watch.jumped(ros::Time(10), ros::SteadyTime(1), true);
+  EXPECT_TRUE(watch.jumped(ros::Time(11.01), ros::SteadyTime(1.1), true));
+}
+
+TEST(ClockWatch, SystemTimeThatLeavesSteadyTimeJumps) {
+  ClockWatch watch;
+  watch.jumped(ros::Time(1000), ros::SteadyTime(1), false);
+  EXPECT_FALSE(watch.jumped(ros::Time(1005.05), ros::SteadyTime(6), false));
+  EXPECT_TRUE(watch.jumped(ros::Time(1005.2), ros::SteadyTime(6.01), false));
+  EXPECT_TRUE(watch.jumped(ros::Time(1005.05), ros::SteadyTime(6.02), false));
+}
+
+geometry_msgs::Transform mounting(double roll, double yaw) {
+  geometry_msgs::Transform transform;
+  transform.translation.x = 1.6;
+  transform.rotation.x = std::sin(0.5 * roll) * std::cos(0.5 * yaw);
+  transform.rotation.y = std::sin(0.5 * roll) * std::sin(0.5 * yaw);
+  transform.rotation.z = std::cos(0.5 * roll) * std::sin(0.5 * yaw);
+  transform.rotation.w = std::cos(0.5 * roll) * std::cos(0.5 * yaw);
+  return transform;
+}
+
+TEST(SensorMounting, FlatSensorsPoseIsItsYaw) {
+  std::string why;
+  const auto pose = planarMounting(mounting(0.0, 0.4), why);
+  ASSERT_TRUE(pose.has_value());
+  EXPECT_NEAR(1.6, pose->x, 1e-12);
+  EXPECT_NEAR(0.4, pose->heading, 1e-9);
+}
+
+TEST(SensorMounting, UpsideDownSensorIsRefused) {
+  std::string why;
+  EXPECT_FALSE(planarMounting(mounting(M_PI, 0.0), why).has_value());
+  EXPECT_NE(std::string::npos, why.find("upside down"));
+}
+
+TEST(SensorMounting, TransformThatIsNoRotationIsRefused) {
+  std::string why;
+  geometry_msgs::Transform zero;
+  EXPECT_FALSE(planarMounting(zero, why).has_value());
+  auto broken = mounting(0.0, 0.0);
+  broken.translation.y = kNan;
+  EXPECT_FALSE(planarMounting(broken, why).has_value());
+}
+
+sensor_msgs::JointState jointState(double stamp, double angle) {
+  sensor_msgs::JointState message;
+  message.header.stamp = ros::Time(stamp);
+  message.name = {"wheel", kArticulationJoint};
+  message.position = {9.0, angle};
+  return message;
+}
+
+nav_msgs::Odometry odometry(double stamp, double speed) {
+  nav_msgs::Odometry message;
+  message.header.stamp = ros::Time(stamp);
+  message.pose.pose.orientation.w = 1.0;
+  message.twist.twist.linear.x = speed;
+  return message;
+}
+
+TEST(MotionInput, SaysNothingUntilBothTopicsSpoke) {
+  MotionInput input;
+  input.setOdometry(odometry(1.0, 2.0));
+  EXPECT_FALSE(input.motion().has_value());
+  input.setJointState(jointState(1.0, 0.2));
+  ASSERT_TRUE(input.motion().has_value());
+  EXPECT_EQ(0.2, input.motion()->articulation);
+  EXPECT_EQ(2.0, input.motion()->speed);
+}
+
+TEST(MotionInput, IsAsOldAsItsOlderPart) {
+  MotionInput input;
+  input.setOdometry(odometry(5.0, 2.0));
+  input.setJointState(jointState(1.0, 0.2));
+  EXPECT_EQ(std::chrono::seconds(1), input.motion()->stamp);
+}
+
+TEST(MotionInput, MeasuresARateThatIsNotTold) {
+  MotionInput input;
+  input.setOdometry(odometry(1.0, 2.0));
+  input.setJointState(jointState(1.0, 0.20));
+  input.setJointState(jointState(1.1, 0.21));
+  EXPECT_NEAR(0.1, input.motion()->articulation_rate, 1e-6);
+}
+
+TEST(MotionInput, PassesOverNumbersThatAreNone) {
+  MotionInput input;
+  input.setOdometry(odometry(1.0, 2.0));
+  input.setJointState(jointState(1.0, 0.2));
+  input.setOdometry(odometry(2.0, kNan));
+  input.setJointState(jointState(2.0, kNan));
+  EXPECT_EQ(2.0, input.motion()->speed);
+  EXPECT_EQ(0.2, input.motion()->articulation);
+  EXPECT_EQ(std::chrono::seconds(1), input.motion()->stamp);
+}
+
+TEST(TunnelInput, BringsTogetherWhatHasOneStamp) {
+  TunnelInput input;
+  perception::TunnelState state;
+  state.stamp = Stamp(5);
+  input.setState(state);
+  EXPECT_FALSE(input.take().has_value());
+  input.setCenterline(Stamp(4), {});
+  EXPECT_FALSE(input.take().has_value());
+  input.setCenterline(Stamp(5), {});
+  EXPECT_TRUE(input.take().has_value());
+  EXPECT_FALSE(input.take().has_value());  // once
+}
+
+TEST(BusTap, CountsBeforeFramesAreReadAndLosesNone) {
+  can::MemoryBusHub hub;
+  auto sender = hub.connect();
+  BusTap tap(hub.connect(), 0x110);
+  can::Frame frame;
+  frame.id = 0x110;
+  sender->send(frame);
+  frame.id = 0x111;
+  sender->send(frame);
+  EXPECT_EQ(1u, tap.count());
+  EXPECT_EQ(0x110u, tap.receive()->id);
+  EXPECT_EQ(0x111u, tap.receive()->id);
+  EXPECT_FALSE(tap.receive().has_value());
+}
+
+}  // namespace
+}  // namespace tunnel_pilot::shell
