@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "tunnel_pilot/simulation/pilot.h"
+#include "tunnel_pilot/simulation/report.h"
+#include "tunnel_pilot/simulation/scenario.h"
+#include "tunnel_pilot/simulation/simulator.h"
+
+namespace tunnel_pilot::simulation {
+
+/// The parameters of all rooms, read once per scenario from its config folder.
+struct Setup {
+  vehicle::TruckParameters truck;
+  SimulatorParameters simulator;
+  TruckControllerParameters truck_controller;
+  PilotParameters pilot;
+  Fingerprints fingerprints;
+};
+
+/// Throws config::ConfigError.
+Setup loadSetup(const Scenario& scenario);
+
+/// One seed of a scenario, once along its way.
+struct EpisodePlan {
+  std::uint64_t seed;
+  bool reversed;
+};
+
+/// All episodes of a scenario: `seeds` seeds from its first one, each in the directions it asks for.
+std::vector<EpisodePlan> episodePlans(const Scenario& scenario, int seeds);
+
+/// Runs one episode. Depends on its arguments alone. Throws config::ConfigError when the scenario's world
+/// cannot be read.
+EpisodeResult runEpisode(const Scenario& scenario, const Setup& setup, const EpisodePlan& plan);
+
+/// Runs episodes on `jobs` threads and returns them in the order of their plans; `progress` is called
+/// with the number done, from one thread at a time. The first exception of an episode is thrown on.
+std::vector<EpisodeResult> runEpisodes(const Scenario& scenario, const Setup& setup,
+                                       const std::vector<EpisodePlan>& plans, int jobs,
+                                       const std::function<void(std::size_t)>& progress);
+
+}  // namespace tunnel_pilot::simulation

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace tunnel_pilot::simulation {
+
+/// SHA-256 (FIPS 180-4) of a text, in hexadecimal.
+std::string sha256(const std::string& text);
+
+/// SHA-256 over the contents of these files, one after the other (what `cat files | sha256sum` tells).
+/// Throws config::ConfigError when one cannot be read.
+std::string sha256OfFiles(const std::vector<std::string>& files);
+
+/// What a report was made from.
+struct Fingerprints {
+  std::string scenario;
+  std::string controller;  ///< the parameter files of the pilot
+  std::string plant;       ///< those of truck and simulator
+  std::string world;       ///< empty without a world
+};
+
+}  // namespace tunnel_pilot::simulation

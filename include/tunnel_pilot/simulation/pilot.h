@@ -1,0 +1,69 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tunnel_pilot/bridge/can_bridge.h"
+#include "tunnel_pilot/drivers/motion_history.h"
+#include "tunnel_pilot/drivers/preview_driver.h"
+#include "tunnel_pilot/simulation/perception_chain.h"
+#include "tunnel_pilot/supervision/arbiter.h"
+
+namespace tunnel_pilot::simulation {
+
+/// The parameters of the pilot's stages, from the files of the config folder.
+struct PilotParameters {
+  PerceptionParameters perception;
+  drivers::PreviewDriverParameters preview_driver;
+  supervision::ArbiterParameters arbiter;
+  bridge::BridgeParameters bridge;
+};
+
+/// The files that make up PilotParameters.
+std::vector<std::string> pilotFiles(const std::string& config_folder);
+
+/// Throws config::ConfigError.
+PilotParameters loadPilot(const std::string& config_folder);
+
+/// The whole pilot without ROS: the same classes that the nodelets wrap, called in the order in which
+/// their messages come. Deterministic: time is an argument, and the bus is given.
+class Pilot {
+ public:
+  Pilot(const PilotParameters& parameters, const vehicle::TruckParameters& truck, can::Bus& bus);
+
+  /// A scan was delivered: perception, driver, arbiter, bridge.
+  void takeScan(const geometry::Scan& scan, Stamp now);
+
+  /// A tunnel from elsewhere, in place of perception: driver, arbiter, bridge.
+  void takeTunnel(const perception::Tunnel& tunnel, Stamp now);
+
+  /// Runs the bridge and the arbiter's timer. Call it at kTickRate.
+  void tick(Stamp now);
+  static constexpr double kTickRate = 100.0;  ///< [Hz]
+
+  bridge::CanBridge::Answer engage(Stamp now) { return bridge_.engage(now); }
+
+  const bridge::CanBridge& bridge() const { return bridge_; }
+  const supervision::Decision& decision() const { return decision_; }
+  const perception::Tunnel& tunnel() const { return tunnel_; }
+  const PerceptionChain& perception() const { return perception_; }
+  const drivers::Proposal& proposal() const { return proposal_; }
+
+ private:
+  void takeMotion(Stamp now);
+  void drive(Stamp now);
+  void decide(Stamp now);
+
+  geometry::Pose sensor_in_base_;
+  PerceptionChain perception_;
+  drivers::PreviewDriver driver_;
+  supervision::Arbiter arbiter_;
+  bridge::CanBridge bridge_;
+  drivers::MotionHistory history_;
+  perception::Tunnel tunnel_;
+  drivers::Proposal proposal_;
+  supervision::Decision decision_;
+  Stamp next_decision_{};
+};
+
+}  // namespace tunnel_pilot::simulation

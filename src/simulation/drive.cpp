@@ -1,0 +1,81 @@
+#include "closed_loop.h"
+
+namespace tunnel_pilot::simulation {
+namespace {
+
+constexpr double kOpenEnd = 30.0;  // an open line is driven up to so far before its end [m]
+
+PilotParameters withTopSpeed(PilotParameters parameters, double top_speed) {
+  parameters.preview_driver.speed = top_speed;
+  return parameters;
+}
+
+class Drive : public ClosedLoop {
+ public:
+  Drive(const DriveExperiment& drive, const Scenario& scenario, const Setup& setup, std::uint64_t seed,
+        bool reversed)
+      : ClosedLoop(scenario, setup, withTopSpeed(setup.pilot, drive.top_speed),
+                   world::loadWorld(drive.world_file, {seed, reversed}), seed),
+        drive_(drive) {}
+
+  EpisodeResult run() {
+    EpisodeResult result;
+    result.ending = "not engaged";
+    const geometry::Pose start =
+        simulator_.poseOnLine(drive_.station, drive_.lateral_offset, drive_.heading_error);
+    if (handOver(start, drive_.rolling_speed)) result.ending = driveOn();
+    const world::World& world = simulator_.world();
+    result.metrics = metrics(result.ending);
+    result.track = std::move(track_);
+    result.perception = std::move(perception_);
+    result.line = world.design_line;
+    result.walls = world.walls;
+    return result;
+  }
+
+ private:
+  void takeScan(const geometry::Scan& scan) override {
+    pilot_.takeScan(scan, simulator_.now());
+    if (!driving_) return;
+    perception_.push_back(
+        comparePerception(pilot_.tunnel().state, simulator_.truthOfScan(), simulator_.world().width));
+  }
+
+  std::string driveOn() {
+    const double start = simulator_.truth().station;
+    const geometry::Path& line = simulator_.world().design_line;
+    const double way = drive_.distance > 0.0 ? drive_.distance
+                       : line.closed()       ? line.length()
+                                             : line.length() - start - kOpenEnd;
+    while (true) {
+      step();
+      if (simulator_.truth().station - start >= way) return kCompleted;
+      const std::string why = whyOver(drive_.time_limit);
+      if (!why.empty()) return why;
+    }
+  }
+
+  Metrics metrics(const std::string& ending) const {
+    Metrics metrics = driveMetrics(track_, simulator_.world().design_line);
+    if (drive_.return_metrics) metrics.merge(returnMetrics(track_));
+    metrics["valid_share"] = perceptionMetrics(perception_).at("valid_share");
+    metrics["contacts"] = ending == "contact" ? 1.0 : 0.0;
+    metrics["completed"] = ending == kCompleted ? 1.0 : 0.0;
+    if (ending == kCompleted) metrics["lap_time"] = time();
+    return metrics;
+  }
+
+  static constexpr const char* kCompleted = "way driven";
+
+  DriveExperiment drive_;
+  std::vector<PerceptionSample> perception_;
+};
+
+}  // namespace
+
+EpisodeResult runDrive(const DriveExperiment& drive, const Scenario& scenario, const Setup& setup,
+                       std::uint64_t seed, bool reversed) {
+  return Drive(drive, scenario, setup, seed, reversed).run();
+}
+
+}  // namespace tunnel_pilot::simulation

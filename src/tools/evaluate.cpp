@@ -1,0 +1,130 @@
+// evaluate: runs a scenario without ROS, holds it against its goals, writes a report.
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <exception>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include <boost/program_options.hpp>
+#include <unistd.h>
+
+#include "tunnel_pilot/simulation/episode.h"
+
+namespace {
+
+namespace options = boost::program_options;
+using namespace tunnel_pilot;
+
+constexpr int kGoalsHold = 0;
+constexpr int kGoalMissed = 1;
+constexpr int kBadInput = 2;
+
+struct Arguments {
+  std::vector<std::string> scenarios;
+  std::string out;
+  std::string config;
+  int seeds = 0;
+  int jobs = 1;
+};
+
+// False when only help was asked for. Throws options::error.
+bool parse(int argc, char** argv, Arguments& arguments) {
+  options::options_description shown("evaluate SCENARIO.yaml...: runs scenarios and judges them.\nOptions");
+  shown.add_options()("help,h", "this text")(
+      "scenario", options::value(&arguments.scenarios)->required()->value_name("FILE"),
+      "scenario file; also without the option's name")(
+      "seeds", options::value(&arguments.seeds)->value_name("N"), "number of seeds instead of the scenario's")(
+      "out", options::value(&arguments.out)->value_name("DIR"),
+      "writes summary.json, CSV files and plots to DIR/<scenario>; without it only the table is printed")(
+      "config", options::value(&arguments.config)->value_name("DIR"),
+      "parameter files instead of the scenario's")(
+      "jobs", options::value(&arguments.jobs)->default_value(1)->value_name("N"), "threads");
+  options::positional_options_description positional;
+  positional.add("scenario", -1);
+  options::variables_map values;
+  options::store(options::command_line_parser(argc, argv).options(shown).positional(positional).run(),
+                 values);
+  if (values.count("help") != 0) {
+    std::cout << shown << "Exit status: 0 every goal holds, 1 a goal is missed, 2 bad input.\n";
+    return false;
+  }
+  options::notify(values);
+  if (values.count("seeds") != 0 && (arguments.seeds < 1 || arguments.seeds > 100'000)) {
+    throw options::error("--seeds must be 1 to 100000");
+  }
+  if (arguments.jobs < 1 || arguments.jobs > 256) throw options::error("--jobs must be 1 to 256");
+  return true;
+}
+
+class ProgressLine {
+ public:
+  ProgressLine(std::string name, std::size_t total) : name_(std::move(name)), total_(total) { show(0); }
+
+  void show(std::size_t done) {
+    const bool last = done == total_;
+    if (!terminal_ && !last) return;
+    const double elapsed =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    std::fprintf(stderr, "%s%s: %zu of %zu episodes, %.1f s%s", terminal_ ? "\r" : "", name_.c_str(), done,
+                 total_, elapsed, last ? "\n" : "");
+    std::fflush(stderr);
+  }
+
+ private:
+  std::string name_;
+  std::size_t total_;
+  bool terminal_ = isatty(2) != 0;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+double simulatedTime(const std::vector<simulation::EpisodeResult>& episodes) {
+  double sum = 0.0;
+  for (const simulation::EpisodeResult& episode : episodes) {
+    if (!episode.track.empty()) sum += episode.track.back().time - episode.track.front().time;
+  }
+  return sum;
+}
+
+// True when every goal of the scenario holds.
+bool evaluate(const std::string& file, const Arguments& arguments) {
+  simulation::Scenario scenario = simulation::loadScenario(file);
+  if (!arguments.config.empty()) scenario.config_folder = arguments.config;
+  const int seeds = arguments.seeds > 0 ? arguments.seeds : scenario.seeds;
+  const simulation::Setup setup = simulation::loadSetup(scenario);
+  const auto plans = simulation::episodePlans(scenario, seeds);
+
+  ProgressLine progress(scenario.name, plans.size());
+  const auto start = std::chrono::steady_clock::now();
+  const auto episodes = simulation::runEpisodes(scenario, setup, plans, arguments.jobs,
+                                                [&](std::size_t done) { progress.show(done); });
+  const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+
+  const simulation::Evaluation evaluation = simulation::judge(scenario, episodes);
+  std::cout << simulation::table(scenario, evaluation);
+  std::printf("%zu episodes, %.0f times real time. %s\n\n", episodes.size(),
+              simulatedTime(episodes) / std::max(elapsed, 1e-9),
+              evaluation.passed ? "Every goal holds." : "A goal is MISSED.");
+  std::fflush(stdout);
+  if (!arguments.out.empty()) {
+    simulation::writeReport(arguments.out + "/" + scenario.name, scenario, evaluation, episodes,
+                            setup.fingerprints, setup.truck.geometry);
+  }
+  return evaluation.passed;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    Arguments arguments;
+    if (!parse(argc, argv, arguments)) return kGoalsHold;
+    bool passed = true;
+    for (const std::string& file : arguments.scenarios) passed = evaluate(file, arguments) && passed;
+    return passed ? kGoalsHold : kGoalMissed;
+  } catch (const std::exception& error) {
+    std::cerr << "evaluate: " << error.what() << "\n";
+    return kBadInput;
+  }
+}

@@ -1,0 +1,247 @@
+// perceive: runs the perception core over a recorded bag; one CSV row a scan.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <boost/program_options.hpp>
+#include <nav_msgs/Odometry.h>
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+#include <sensor_msgs/LaserScan.h>
+#include <sys/resource.h>
+
+#include "tunnel_pilot/drivers/motion_history.h"
+#include "tunnel_pilot/simulation/perception_chain.h"
+
+namespace {
+
+namespace options = boost::program_options;
+using namespace tunnel_pilot;
+
+constexpr const char* kOdometryTopic = "/odom";
+constexpr rlim_t kMemoryLimit = rlim_t{4} << 30;  // a bag's own sizes are not to be trusted [bytes]
+
+struct Arguments {
+  std::string bag;
+  std::string csv;
+  std::string topic;
+  std::string config;
+  std::vector<double> transform = {0.0, 0.0, 0.0};
+};
+
+// False when only help was asked for. Throws options::error.
+bool parse(int argc, char** argv, Arguments& arguments) {
+  options::options_description shown(
+      "perceive --bag FILE --csv FILE: runs the perception over a recorded bag.\n"
+      "Writes stamp,valid,width,heading_error,lateral_offset,curvature [s, 1, m, rad, m, 1/m] for each\n"
+      "scan; the numbers are empty where valid is 0.\nOptions");
+  shown.add_options()("help,h", "this text")(
+      "bag", options::value(&arguments.bag)->required()->value_name("FILE"), "recorded bag")(
+      "csv", options::value(&arguments.csv)->required()->value_name("FILE"), "output")(
+      "topic", options::value(&arguments.topic)->value_name("NAME"),
+      "scan topic; needed only where the bag has several and none is /scan")(
+      "config", options::value(&arguments.config)->value_name("DIR"),
+      "scan_filter.yaml, wall_segmentation.yaml or centerline.yaml found here replace the package's own, "
+      "for instance config/corridor for widths of 1.5 to 4 m")(
+      "transform", options::value(&arguments.transform)->multitoken()->value_name("X Y YAW"),
+      "laser in base_link [m m rad]; without it the laser's frame is taken as base_link");
+  using Style = options::command_line_style::style_t;
+  options::variables_map values;
+  // Without short options, so that "-0.5" is a number.
+  options::store(options::command_line_parser(argc, argv)
+                     .options(shown)
+                     .style(Style::unix_style & ~Style::allow_short)
+                     .run(),
+                 values);
+  if (values.count("help") != 0) {
+    std::cout << shown << "Exit status: 0 done, 2 bad input.\n";
+    return false;
+  }
+  options::notify(values);
+  if (arguments.transform.size() != 3) throw options::error("--transform needs three numbers: x y yaw");
+  return true;
+}
+
+// The package's own parameter files: beside the build or in the install space this program stands in.
+std::string defaultConfig() {
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe");
+  for (std::filesystem::path folder = program.parent_path(); folder.has_relative_path();
+       folder = folder.parent_path()) {
+    for (const std::filesystem::path config : {folder / "config", folder / "share/tunnel_pilot/config"}) {
+      if (std::filesystem::exists(config / "centerline.yaml")) return config.string();
+    }
+  }
+  throw std::runtime_error("no parameter files found beside the program: name them with --config");
+}
+
+// The package's parameter files, but for those that the given folder has.
+std::vector<std::string> parameterFiles(const std::string& folder) {
+  std::vector<std::string> files = simulation::perceptionFiles(defaultConfig());
+  if (folder.empty()) return files;
+  const std::vector<std::string> given = simulation::perceptionFiles(folder);
+  bool any = false;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (!std::filesystem::exists(given[i])) continue;
+    files[i] = given[i];
+    any = true;
+  }
+  if (!any) throw std::runtime_error("'" + folder + "' holds none of the perception's parameter files");
+  return files;
+}
+
+std::vector<std::string> topicsOfType(const rosbag::Bag& bag, const std::string& type) {
+  rosbag::View view(bag);
+  std::vector<std::string> topics;
+  for (const rosbag::ConnectionInfo* connection : view.getConnections()) {
+    if (connection->datatype == type) topics.push_back(connection->topic);
+  }
+  std::sort(topics.begin(), topics.end());
+  topics.erase(std::unique(topics.begin(), topics.end()), topics.end());
+  return topics;
+}
+
+std::string scanTopic(const rosbag::Bag& bag, const std::string& wanted) {
+  const std::vector<std::string> topics = topicsOfType(bag, "sensor_msgs/LaserScan");
+  std::string list;
+  for (const std::string& topic : topics) list += " " + topic;
+  if (topics.empty()) throw std::runtime_error("the bag holds no sensor_msgs/LaserScan");
+  const auto has = [&](const std::string& topic) {
+    return std::find(topics.begin(), topics.end(), topic) != topics.end();
+  };
+  if (!wanted.empty()) {
+    for (const std::string& topic : {wanted, "/" + wanted}) {
+      if (has(topic)) return topic;
+    }
+    throw std::runtime_error("the bag has no scans on '" + wanted + "', but on" + list);
+  }
+  if (topics.size() == 1) return topics.front();
+  if (has("/scan")) return "/scan";
+  throw std::runtime_error("the bag has several scan topics, choose one with --topic:" + list);
+}
+
+Stamp stampOf(const std_msgs::Header& header) {
+  return std::chrono::seconds(header.stamp.sec) + std::chrono::nanoseconds(header.stamp.nsec);
+}
+
+geometry::Scan scanOf(const sensor_msgs::LaserScan& message) {
+  geometry::Scan scan;
+  scan.stamp = stampOf(message.header);
+  scan.angle_min = message.angle_min;
+  scan.angle_increment = message.angle_increment;
+  scan.time_increment = message.time_increment;
+  scan.range_min = message.range_min;
+  scan.range_max = message.range_max;
+  scan.ranges = message.ranges;
+  return scan;
+}
+
+drivers::Motion motionOf(const nav_msgs::Odometry& message) {
+  const auto& q = message.pose.pose.orientation;
+  drivers::Motion motion;
+  motion.stamp = stampOf(message.header);
+  motion.pose = {message.pose.pose.position.x, message.pose.pose.position.y,
+                 std::atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))};
+  motion.speed = message.twist.twist.linear.x;
+  motion.yaw_rate = message.twist.twist.angular.z;
+  return motion;
+}
+
+std::string row(Stamp stamp, const perception::Tunnel* tunnel) {
+  char text[256];
+  const auto ns = static_cast<long long>(stamp.count());
+  int length = std::snprintf(text, sizeof text, "%lld.%09lld,", ns / 1'000'000'000, ns % 1'000'000'000);
+  std::string line(text, static_cast<std::size_t>(length));
+  if (tunnel == nullptr || !tunnel->state.valid) return line + "0,,,,\n";
+  const perception::TunnelState& state = tunnel->state;
+  length = std::snprintf(text, sizeof text, "1,%.6f,%.6f,%.6f,%.6f\n", state.width, state.heading_error,
+                         state.lateral_offset, state.curvature);
+  return line + std::string(text, static_cast<std::size_t>(length));
+}
+
+// Takes a bag's messages in their order, as the nodelets would.
+class Perceiver {
+ public:
+  Perceiver(const simulation::PerceptionParameters& parameters, const geometry::Pose& sensor)
+      : chain_(parameters), sensor_(sensor) {}
+
+  void takeOdometry(const nav_msgs::Odometry& message) { odometry_.add(motionOf(message)); }
+
+  void takeScan(const sensor_msgs::LaserScan& message) {
+    const geometry::Scan scan = scanOf(message);
+    const perception::Tunnel* tunnel =
+        chain_.update(scan, sensor_, odometry_.poseAt(scan.stamp), scan.stamp);
+    csv_ += row(scan.stamp, tunnel);
+    if (tunnel == nullptr) {
+      ++answers_[perception::toString(chain_.filtered().rejection)];
+    } else {
+      ++answers_[tunnel->state.valid ? "valid" : perception::toString(tunnel->state.reason)];
+    }
+  }
+
+  const std::string& csv() const { return csv_; }
+  const std::map<std::string, int>& answers() const { return answers_; }
+
+ private:
+  simulation::PerceptionChain chain_;
+  geometry::Pose sensor_;
+  drivers::MotionHistory odometry_;
+  std::string csv_ = "stamp,valid,width,heading_error,lateral_offset,curvature\n";
+  std::map<std::string, int> answers_;
+};
+
+void readBag(const Arguments& arguments, Perceiver& perceiver) {
+  rosbag::Bag bag(arguments.bag, rosbag::bagmode::Read);
+  const std::string topic = scanTopic(bag, arguments.topic);
+  rosbag::View view(bag, rosbag::TopicQuery(std::vector<std::string>{topic, kOdometryTopic}));
+  for (const rosbag::MessageInstance& message : view) {
+    if (message.getTopic() == topic) {
+      const auto scan = message.instantiate<sensor_msgs::LaserScan>();
+      if (!scan) throw std::runtime_error("a message on '" + topic + "' is not a scan");
+      perceiver.takeScan(*scan);
+    } else if (const auto odometry = message.instantiate<nav_msgs::Odometry>()) {
+      perceiver.takeOdometry(*odometry);
+    }
+  }
+}
+
+void perceive(const Arguments& arguments) {
+  if (!std::filesystem::is_regular_file(arguments.bag)) throw std::runtime_error("no such file");
+  simulation::PerceptionParameters parameters =
+      simulation::loadPerception(parameterFiles(arguments.config));
+  parameters.scan_filter.check_age = false;  // a recording is as old as it is
+  Perceiver perceiver(parameters,
+                      {arguments.transform[0], arguments.transform[1], arguments.transform[2]});
+  readBag(arguments, perceiver);
+  std::ofstream out(arguments.csv, std::ios::binary | std::ios::trunc);
+  out << perceiver.csv();
+  out.close();
+  if (!out) throw std::runtime_error("cannot write '" + arguments.csv + "'");
+  for (const auto& [answer, count] : perceiver.answers()) {
+    std::cerr << "perceive: " << count << " scans: " << answer << "\n";
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const rlimit limit{kMemoryLimit, kMemoryLimit};
+  setrlimit(RLIMIT_AS, &limit);
+  Arguments arguments;
+  try {
+    if (!parse(argc, argv, arguments)) return 0;
+    perceive(arguments);
+    return 0;
+  } catch (const std::exception& error) {
+    std::cerr << "perceive: " << (arguments.bag.empty() ? "" : arguments.bag + ": ") << error.what() << "\n";
+    return 2;
+  }
+}
