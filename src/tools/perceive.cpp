@@ -76,7 +76,7 @@ std::string defaultConfig() {
   const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe");
   for (std::filesystem::path folder = program.parent_path(); folder.has_relative_path();
        folder = folder.parent_path()) {
-    for (const std::filesystem::path config : {folder / "config", folder / "share/tunnel_pilot/config"}) {
+    for (const std::filesystem::path& config : {folder / "config", folder / "share/tunnel_pilot/config"}) {
       if (std::filesystem::exists(config / "centerline.yaml")) return config.string();
     }
   }

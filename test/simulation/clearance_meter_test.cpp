@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "tunnel_pilot/simulation/random.h"
+#include "tunnel_pilot/world/ray_caster.h"
 
 namespace tunnel_pilot::simulation {
 namespace {

@@ -123,8 +123,8 @@ TEST(Table, ShowsPaperGoalMedianWorstAndVerdictInTheMetricsUnit) {
   auto episodes = episodesWith("lateral_mean", {0.01, 0.03});
   for (EpisodeResult& episode : episodes) episode.metrics["heading_mean"] = 0.017453292519943295;
   const std::string text = table(scenario, judge(scenario, episodes));
-  EXPECT_NE(text.find("-54 mm  -20 .. 20"), std::string::npos) << text;
-  EXPECT_NE(text.find("20      30  MISSED"), std::string::npos) << text;
+  EXPECT_NE(text.find("-54 mm     -20 .. 20"), std::string::npos) << text;
+  EXPECT_NE(text.find("20     30  MISSED"), std::string::npos) << text;
   EXPECT_NE(text.find("[deg]"), std::string::npos) << text;
 }
 
