@@ -24,27 +24,31 @@ namespace {
 using geometry::Point;
 using geometry::Pose;
 
-constexpr int kSegments = 16;            // in a chunk
-constexpr int kVertices = kSegments + 1;
-constexpr int kStride = 20;              // vertices stored a chunk, the last one repeated
+constexpr int kVertices = 16;            // in a chunk, the last one repeated where there are less
+constexpr int kSegments = kVertices - 1;
 constexpr int kLane = 4;                 // beams filled at once
-constexpr int kMaxBeams = 4096;
+constexpr int kMaxBeams = 16384;
 constexpr double kAngleError = 5e-6;     // bound on the float angle's error [rad]
 // A beam that meets a line at range r, where the line passes the sensor at distance h, has a rounding error
 // of about 2e-7 r^2 / h: below 0.5 mm where h exceeds this times r^2.
 constexpr float kGrazing = 4e-4F;        // [1/m]
 
-struct Chunk {
-  double x;       // bounding circle [m]
+// What encloses a chunk: all points within `thickness` of a line through the middle, half of which is
+// (along_x, along_y). Walls are long and thin, so this culls far better than a circle.
+struct Bounds {
+  double x;  // middle [m]
   double y;
-  float radius;
+  float along_x;
+  float along_y;
+  float thickness;
+  float radius;  // of the circle about the middle [m]
 };
 
-// Chains cut into chunks of at most kSegments segments with a bounding circle each.
+// Chains cut into chunks of at most kSegments segments.
 class ChunkList {
  public:
   void assign(const std::vector<WallChain>& chains) {
-    chunks.clear();
+    bounds.clear();
     x.clear();
     y.clear();
     for (const WallChain& chain : chains) {
@@ -54,24 +58,30 @@ class ChunkList {
     }
   }
 
-  std::vector<Chunk> chunks;
-  std::vector<double> x;  // kStride vertices a chunk [m]
+  std::vector<Bounds> bounds;  // of the chunks
+  std::vector<double> x;  // kVertices a chunk [m]
   std::vector<double> y;
 
  private:
   void add(const Point* vertices, std::size_t count) {
-    Point low = vertices[0];
-    Point high = vertices[0];
+    Point along = vertices[count - 1] - vertices[0];
+    along = along.norm() > 0.0 ? along.normalized() : Point(1.0, 0.0);
+    const Point across(-along.y(), along.x());
+    Point low(1e300, 1e300);
+    Point high(-1e300, -1e300);
     for (std::size_t i = 0; i < count; ++i) {
       if (!vertices[i].allFinite()) throw std::invalid_argument("a wall vertex is not finite");
-      low = low.cwiseMin(vertices[i]);
-      high = high.cwiseMax(vertices[i]);
+      const Point p(vertices[i].dot(along), vertices[i].dot(across));
+      low = low.cwiseMin(p);
+      high = high.cwiseMax(p);
     }
-    const Point centre = 0.5 * (low + high);
-    double radius = 0.0;
-    for (std::size_t i = 0; i < count; ++i) radius = std::max(radius, (vertices[i] - centre).norm());
-    chunks.push_back({centre.x(), centre.y(), static_cast<float>(radius) + 1e-3F});
-    for (std::size_t i = 0; i < kStride; ++i) {
+    const Point middle = 0.5 * (low.x() + high.x()) * along + 0.5 * (low.y() + high.y()) * across;
+    const Point half = 0.5 * (high - low);
+    const float slack = 1e-3F;  // for the rounding of float [m]
+    bounds.push_back({middle.x(), middle.y(), static_cast<float>(half.x() * along.x()),
+                      static_cast<float>(half.x() * along.y()), static_cast<float>(half.y()) + slack,
+                      static_cast<float>(half.norm()) + slack});
+    for (std::size_t i = 0; i < kVertices; ++i) {
       x.push_back(vertices[std::min(i, count - 1)].x());
       y.push_back(vertices[std::min(i, count - 1)].y());
     }
@@ -83,8 +93,8 @@ struct View {
   double x, y;                    // sensor [m]
   double cosine, sine;            // of the middle direction of all beams, in the map
   int first, last;
-  float left_x, left_y;           // direction of the last beam, in the map
-  float right_x, right_y;         // direction of the first beam
+  Eigen::Vector2f right;          // direction of the first beam, in the map
+  Eigen::Vector2f left;           // direction of the last beam, in the map
   bool wide;                      // the beams span more than half a turn
   float range_max;                // [m]
   float* inverse;                 // 1 / range by beam [1/m]
@@ -92,14 +102,15 @@ struct View {
 
 // What the vertices and segments of a chunk are in the sensor's frame, whose x axis is the middle beam.
 struct Projected {
-  alignas(16) float x[kStride];
-  alignas(16) float y[kStride];
-  alignas(16) float u[kStride];  // place among the beams: their index, not rounded
-  alignas(16) float a[kSegments];
-  alignas(16) float b[kSegments];
-  alignas(16) int from[kSegments];
-  alignas(16) int to[kSegments];
-  alignas(16) int special[kSegments];  // 1: nearly edge-on; 2: passes behind the sensor
+  // One more vertex, the last one again, so that there are as many segments as vertices.
+  alignas(32) float x[kVertices + 1];
+  alignas(32) float y[kVertices + 1];
+  alignas(32) float u[kVertices + 1];  // place among the beams: their index, not rounded
+  alignas(32) float a[kVertices];
+  alignas(32) float b[kVertices];
+  alignas(32) int from[kVertices];
+  alignas(32) int to[kVertices];
+  alignas(32) int special[kVertices];  // 1: nearly edge-on; 2: passes behind the sensor
 };
 
 // atan on [0, 1], error below 2e-6.
@@ -142,7 +153,7 @@ RayCaster::Impl::Impl(const Beams& wanted) : beams(wanted) {
       !(wanted.angle_increment > 0.0) || !(span <= 2.0 * M_PI + 1e-6) ||
       !(wanted.range_max > 0.0 && wanted.range_max <= 1e4)) {
     throw std::invalid_argument(
-        "beams need a count of 1 to 4096, a finite angle_min [rad], a positive angle_increment [rad] that "
+        "beams need a count of 1 to 16384, a finite angle_min [rad], a positive angle_increment [rad] that "
         "spans at most a full turn, and a range_max [m] in (0, 10000]");
   }
   middle_beam = 0.5 * (wanted.count - 1);
@@ -160,8 +171,6 @@ RayCaster::Impl::Impl(const Beams& wanted) : beams(wanted) {
 }
 
 View RayCaster::Impl::view(const Pose& sensor, int first, int last, float* inverse) const {
-  const double right = sensor.heading + beams.angle_min + first * beams.angle_increment;
-  const double left = sensor.heading + beams.angle_min + (last - 1) * beams.angle_increment;
   View v{};
   v.x = sensor.x;
   v.y = sensor.y;
@@ -169,27 +178,34 @@ View RayCaster::Impl::view(const Pose& sensor, int first, int last, float* inver
   v.sine = std::sin(sensor.heading + middle);
   v.first = first;
   v.last = last;
-  v.right_x = static_cast<float>(std::cos(right));
-  v.right_y = static_cast<float>(std::sin(right));
-  v.left_x = static_cast<float>(std::cos(left));
-  v.left_y = static_cast<float>(std::sin(left));
-  v.wide = left - right > M_PI;
+  const auto direction = [&](int beam) {
+    const auto k = static_cast<std::size_t>(beam);
+    return Eigen::Vector2f(static_cast<float>(v.cosine * exact_cosine[k] - v.sine * exact_sine[k]),
+                           static_cast<float>(v.sine * exact_cosine[k] + v.cosine * exact_sine[k]));
+  };
+  v.right = direction(first);
+  v.left = direction(last - 1);
+  v.wide = (last - 1 - first) * beams.angle_increment > M_PI;
   v.range_max = static_cast<float>(beams.range_max);
   v.inverse = inverse;
   return v;
 }
 
 void RayCaster::Impl::castList(const ChunkList& list, const View& view) const {
-  for (std::size_t i = 0; i < list.chunks.size(); ++i) {
-    const Chunk& chunk = list.chunks[i];
-    const auto dx = static_cast<float>(chunk.x - view.x);
-    const auto dy = static_cast<float>(chunk.y - view.y);
-    const float reach = view.range_max + chunk.radius;
+  for (std::size_t i = 0; i < list.bounds.size(); ++i) {
+    const Bounds& b = list.bounds[i];
+    const auto dx = static_cast<float>(b.x - view.x);
+    const auto dy = static_cast<float>(b.y - view.y);
+    const float reach = view.range_max + b.radius;
     if (dx * dx + dy * dy > reach * reach) continue;
-    const bool left_of_first = view.right_x * dy - view.right_y * dx >= -chunk.radius;
-    const bool right_of_last = view.left_y * dx - view.left_x * dy >= -chunk.radius;
+    // True when some of the chunk lies to the left of a ray in this direction.
+    const auto leftOf = [&](float x, float y) {
+      return x * dy - y * dx + std::abs(x * b.along_y - y * b.along_x) + b.thickness >= 0.0F;
+    };
+    const bool left_of_first = leftOf(view.right.x(), view.right.y());
+    const bool right_of_last = leftOf(-view.left.x(), -view.left.y());
     if (view.wide ? !(left_of_first || right_of_last) : !(left_of_first && right_of_last)) continue;
-    castChunk(&list.x[i * kStride], &list.y[i * kStride], view);
+    castChunk(&list.x[i * kVertices], &list.y[i * kVertices], view);
   }
 }
 
@@ -198,13 +214,13 @@ void RayCaster::Impl::project(const double* x, const double* y, const View& view
   const auto s = static_cast<float>(view.sine);
   const auto scale = static_cast<float>(per_radian);
   const auto middle_place = static_cast<float>(middle_beam);
-  for (int i = 0; i < kStride; ++i) {
+  for (int i = 0; i < kVertices; ++i) {
     const auto dx = static_cast<float>(x[i] - view.x);
     const auto dy = static_cast<float>(y[i] - view.y);
     p.x[i] = c * dx + s * dy;
     p.y[i] = c * dy - s * dx;
   }
-  for (int i = 0; i < kStride; ++i) {
+  for (int i = 0; i < kVertices; ++i) {
     const float ax = std::abs(p.x[i]);
     const float ay = std::abs(p.y[i]);
     const float large = (ax > ay ? ax : ay) + 1e-30F;
@@ -222,12 +238,12 @@ void RayCaster::Impl::placeExactly(const double* x, const double* y, const View&
                                    Projected& p) const {
   constexpr float kRounder = 12582912.0F;  // 1.5 * 2^23: adding and taking it away rounds
   int near_a_beam = 0;
-  for (int i = 0; i < kStride; ++i) {
+  for (int i = 0; i < kVertices; ++i) {
     const float nearest = (p.u[i] + kRounder) - kRounder;
     near_a_beam |= std::abs(p.u[i] - nearest) < window ? 1 : 0;
   }
   if (near_a_beam == 0) return;
-  for (int i = 0; i < kStride; ++i) {
+  for (int i = 0; i < kVertices; ++i) {
     const float nearest = std::nearbyint(p.u[i]);
     if (std::abs(p.u[i] - nearest) >= window) continue;
     const double dx = x[i] - view.x;
@@ -242,7 +258,10 @@ void RayCaster::Impl::makeSegments(const View& view, Projected& p) const {
   const auto half_turn = static_cast<float>(M_PI * per_radian);
   const auto first = static_cast<float>(view.first);
   const auto last = static_cast<float>(view.last - 1);
-  for (int i = 0; i < kSegments; ++i) {
+  p.x[kVertices] = p.x[kSegments];
+  p.y[kVertices] = p.y[kSegments];
+  p.u[kVertices] = p.u[kSegments];
+  for (int i = 0; i < kVertices; ++i) {
     const float dx = p.x[i + 1] - p.x[i];
     const float dy = p.y[i + 1] - p.y[i];
     const float cross = p.x[i] * dy - p.y[i] * dx;
@@ -265,13 +284,19 @@ void RayCaster::Impl::makeSegments(const View& view, Projected& p) const {
   }
 }
 
-void RayCaster::Impl::fill(float a, float b, int from, int to, float* inverse) const {
-  const float* c = cosine.data();
-  const float* s = sine.data();
-  for (int i = from; i <= to; ++i) {
+inline void RayCaster::Impl::fill(float a, float b, int from, int to, float* __restrict inverse) const {
+  const float* __restrict c = cosine.data();
+  const float* __restrict s = sine.data();
+  const auto offer = [&](int i) {
     const float value = c[i] * a + s[i] * b;
     inverse[i] = value > inverse[i] ? value : inverse[i];
+  };
+  int i = from;
+  for (; i + kLane <= to + 1; i += kLane) {
+    for (int k = 0; k < kLane; ++k) offer(i + k);
   }
+#pragma GCC unroll 1
+  for (; i <= to; ++i) offer(i);
 }
 
 void RayCaster::Impl::fillExactly(const double* x, const double* y, const View& view, int from,
