@@ -11,8 +11,7 @@ namespace {
 
 constexpr double kLongestPause = 0.1;       // [s] a command moves no further than in this time
 constexpr double kPredictionStep = 0.03;    // [s]
-constexpr double kFollowingTime = 0.5;      // [s] memory of the watch on the truck's following
-constexpr double kDisturbanceSpeed = 1.0;   // [m/s] slower, the gyro's drift outweighs the curvature
+constexpr double kSteady = 0.01;            // [rad] nearer to its command, the articulation stands
 constexpr double kOffsetJump = 0.5;         // [m] beyond, the filter starts anew
 constexpr double kHeadingJump = 0.15;       // [rad]
 // How fast a reversing command crosses the valve's dead band, in its own movements.
@@ -50,12 +49,14 @@ PreviewDriverParameters loadPreviewDriver(config::Node node) {
   p.weights.heading = weights.number("heading", "1/rad^2", 0.0, 1e4);
   p.weights.rate = weights.number("rate", "s^2/rad^2", 1e-3, 1e4);
   p.weights.terminal = weights.number("terminal", "1", 1.0, 1e3);
+  p.weights.rate_share = weights.number("rate_share", "1", 0.3, 1.0);
   weights.finish();
   config::Node steering = node.child("steering");
   p.dead_time = steering.number("dead_time", "s", 0.0, 1.0);
   p.transport_delay = steering.number("transport_delay", "s", 0.0, 0.3);
   p.lag = steering.number("lag", "s", 0.02, 2.0);
   p.dead_band = steering.number("dead_band", "rad", 0.0, 0.05);
+  p.lead = steering.number("lead", "rad", 0.01, 1.0);
   p.max_rate = steering.number("max_rate", "rad/s", 0.01, 2.0);
   p.max_articulation = steering.number("max_articulation", "rad", 0.1, 1.2);
   steering.finish();
@@ -63,10 +64,18 @@ PreviewDriverParameters loadPreviewDriver(config::Node node) {
   config::Node filter = node.child("filter");
   p.offset_time = filter.number("offset_time", "s", 0.0, 2.0);
   p.heading_time = filter.number("heading_time", "s", 0.0, 2.0);
-  p.disturbance_time = filter.number("disturbance_time", "s", 0.1, 60.0);
-  p.max_disturbance = filter.number("max_disturbance", "1/m", 0.0, 0.05);
+  p.bias_time = filter.number("bias_time", "s", 0.1, 100.0);
+  p.max_bias = filter.number("max_bias", "rad", 0.0, 0.1);
   filter.finish();
-  p.follow_tolerance = node.number("follow_tolerance", "rad", 0.02, 1.0);
+  config::Node yaw = node.child("yaw_response");
+  p.yaw.gain = yaw.number("gain", "1", 0.5, 1.5);
+  p.yaw.gain_deviation = yaw.number("gain_deviation", "1", 0.0, 0.5);
+  p.yaw.disturbance_deviation = yaw.number("disturbance_deviation", "1/m", 0.0, 0.05);
+  p.yaw.memory = yaw.number("memory", "s", 1.0, 1000.0);
+  p.yaw.noise = yaw.number("noise", "rad/s", 1e-3, 1.0);
+  p.yaw.rate_noise = yaw.number("rate_noise", "1", 0.0, 2.0);
+  p.yaw.least_speed = yaw.number("least_speed", "m/s", 0.1, 5.0);
+  yaw.finish();
   node.finish();
   return p;
 }
@@ -75,7 +84,8 @@ PreviewDriver::PreviewDriver(const PreviewDriverParameters& parameters,
                              const vehicle::TruckGeometry& geometry)
     : parameters_(parameters),
       geometry_(geometry),
-      planner_(response(parameters, geometry), parameters.weights, parameters.step) {}
+      planner_(response(parameters, geometry), parameters.weights, parameters.step),
+      yaw_(parameters.yaw, geometry) {}
 
 void PreviewDriver::reset() {
   planner_.reset();
@@ -83,7 +93,8 @@ void PreviewDriver::reset() {
   last_time_.reset();
   last_motion_.reset();
   last_scan_pose_.reset();
-  disturbance_ = 0.0;
+  yaw_.reset();
+  bias_ = 0.0;
   play_ = 0.0;
 }
 
@@ -106,10 +117,13 @@ Proposal PreviewDriver::propose(const perception::Tunnel& tunnel, const Motion& 
   learnFrom(motion);
   const double elapsed =
       last_time_ ? std::clamp(toSeconds(now - *last_time_), 0.0, kLongestPause) : 0.0;
-  const PathState start = predict(tunnel, *scan_pose, errors, motion, now);
+  const PathState start = predict(tunnel, *scan_pose, errors, *last_motion_, now);
   const double speed = std::max(motion.speed, parameters_.planning_speed);
-  const double rate = planner_.plan(start, tunnel.centerline, speed, disturbance_, elapsed);
-  give(start.command + rate * elapsed, now);
+  const double rate = planner_.plan(start, tunnel.centerline, speed, yaw_.response(), elapsed);
+  // What leads the articulation by more than the lag explains would only have to be taken back.
+  const double lead = parameters_.lead;
+  give(std::clamp(start.command + rate * elapsed, start.articulation - lead, start.articulation + lead),
+       now);
   last_time_ = now;
 
   proposal.valid = true;
@@ -130,7 +144,7 @@ PreviewDriver::Errors PreviewDriver::filterErrors(const perception::Tunnel& tunn
   if (last_scan_pose_ && measured.stamp >= last_scan_) {
     const double elapsed = toSeconds(measured.stamp - last_scan_);
     const Errors expected = carried(last_errors_, last_scan_pose_->relative(scan_pose),
-                                    measured.curvature, elapsed);
+                                    measured.curvature, elapsed, last_motion_ ? last_motion_->articulation : 0.0);
     const double offset_change = measured.lateral_offset - expected.offset;
     const double heading_change = geometry::wrapAngle(measured.heading_error - expected.heading);
     if (std::abs(offset_change) < kOffsetJump && std::abs(heading_change) < kHeadingJump) {
@@ -145,12 +159,14 @@ PreviewDriver::Errors PreviewDriver::filterErrors(const perception::Tunnel& tunn
 }
 
 PreviewDriver::Errors PreviewDriver::carried(const Errors& from, const geometry::Pose& step,
-                                             double curvature, double elapsed) const {
+                                             double curvature, double elapsed,
+                                             double articulation) const {
   const double along = std::cos(from.heading) * step.x - std::sin(from.heading) * step.y;
   const double across = std::sin(from.heading) * step.x + std::cos(from.heading) * step.y;
   const double speed = elapsed > 0.0 ? along / elapsed : 0.0;
-  const double slip =
+  const double sideways =
       elapsed > 0.0 ? -parameters_.slip_compliance * speed * step.heading / elapsed : 0.0;
+  const double slip = sideways + (yaw_.response().gain - 1.0) * std::tan(0.5 * articulation);
   const double on_path = along / std::max(0.2, 1.0 - curvature * from.offset);
   return {from.s + on_path, from.offset + across + along * slip - 0.5 * curvature * on_path * on_path,
           from.heading + step.heading - curvature * on_path};
@@ -163,25 +179,21 @@ void PreviewDriver::learnFrom(const Motion& motion) {
   if (elapsed > kLongestPause) dropCommands(motion.articulation);
   last_motion_ = motion;
 
-  const double wanted = commandAt(motion.stamp - delay()) - expected_articulation_;
-  const double most = parameters_.max_rate * elapsed;
-  expected_articulation_ += std::clamp(gain(elapsed, parameters_.lag) * wanted, -most, most);
-  expected_articulation_ +=
-      gain(elapsed, kFollowingTime) * (motion.articulation - expected_articulation_);
-  if (std::abs(motion.articulation - expected_articulation_) > parameters_.follow_tolerance) {
-    dropCommands(motion.articulation);
+  const double moving = commandAt(motion.stamp - delay()) - commanded_articulation_;
+  commanded_articulation_ += gain(elapsed, parameters_.lag) * moving;
+  if (std::abs(moving) < kSteady) {
+    const double deviation = motion.articulation - commanded_articulation_;
+    bias_ += gain(elapsed, parameters_.bias_time) * (deviation - bias_);
+    bias_ = std::clamp(bias_, -parameters_.max_bias, parameters_.max_bias);
   }
-  if (motion.speed < kDisturbanceSpeed) return;
-  const double unexplained = motion.yaw_rate - vehicle::yawRate(geometry_, motion.speed, motion.articulation,
-                                                                motion.articulation_rate);
-  disturbance_ += gain(elapsed, parameters_.disturbance_time) * (unexplained / motion.speed - disturbance_);
-  disturbance_ = std::clamp(disturbance_, -parameters_.max_disturbance, parameters_.max_disturbance);
+  last_motion_->articulation -= bias_;
+  yaw_.update(*last_motion_, elapsed);
 }
 
 PathState PreviewDriver::predict(const perception::Tunnel& tunnel, const geometry::Pose& scan_pose,
                                  const Errors& errors, const Motion& motion, Stamp now) const {
   const Errors driven = carried(errors, scan_pose.relative(motion.pose), tunnel.state.curvature,
-                                toSeconds(motion.stamp - tunnel.state.stamp));
+                                toSeconds(motion.stamp - tunnel.state.stamp), motion.articulation);
   PathState state{driven.s, driven.offset, driven.heading, motion.articulation, 0.0};
   PathCursor cursor(tunnel.centerline, state.s);
   double heading = cursor.headingAt(state.s);
@@ -192,7 +204,7 @@ PathState PreviewDriver::predict(const perception::Tunnel& tunnel, const geometr
     state.command = commandAt(motion.stamp + fromSeconds((i + 0.5) * step) - delay());
     const double ahead = std::max(1e-3, motion.speed * step);
     const double curvature = (cursor.headingAt(state.s + ahead) - heading) / ahead;
-    state = planner_.advance(state, 0.0, motion.speed, curvature, disturbance_, step);
+    state = planner_.advance(state, 0.0, motion.speed, curvature, yaw_.response(), step);
     heading = cursor.headingAt(state.s);
   }
   state.command = given_[newest_].command;
@@ -213,7 +225,7 @@ double PreviewDriver::commandAt(Stamp time) const {
 
 void PreviewDriver::dropCommands(double articulation) {
   given_.fill({Stamp::min(), articulation});
-  expected_articulation_ = articulation;
+  commanded_articulation_ = articulation;
   play_ = 0.0;
 }
 

@@ -13,6 +13,9 @@ double curvatureRoom(double curvature, double offset) {
   return std::max(0.2, 1.0 - curvature * offset);
 }
 
+// A sweep whose corrections do not help even at this share is not followed.
+constexpr double kLeastCorrection = 0.2;
+
 // Share of the command's distance that a first-order lag covers in one step.
 double lagShare(double step, double lag) { return 1.0 - std::exp(-step / lag); }
 
@@ -29,7 +32,7 @@ PreviewPlanner::PreviewPlanner(const TruckResponse& truck, const PreviewWeights&
 void PreviewPlanner::reset() { rates_.fill(0.0); }
 
 PathState PreviewPlanner::advance(const PathState& now, double command_rate, double speed,
-                                  double curvature, double disturbance, double step) const {
+                                  double curvature, const YawResponse& believed, double step) const {
   const double share = step == step_ ? share_ : lagShare(step, truck_.lag);
   const double most = truck_.max_rate * step;
   const double turn_of_hinge =
@@ -38,9 +41,10 @@ PathState PreviewPlanner::advance(const PathState& now, double command_rate, dou
   const double travel = speed * step;
   const double arm = truck_.geometry.front_axle_to_hinge * std::cos(middle) +
                      truck_.geometry.rear_axle_to_hinge;
-  const double turn = (travel * std::sin(middle) + truck_.geometry.rear_axle_to_hinge * turn_of_hinge) /
-                          arm + travel * disturbance;
-  const double slip = -truck_.slip_compliance * speed * turn / step;
+  const double turn = (believed.gain * travel * std::sin(middle) + truck_.geometry.rear_axle_to_hinge * turn_of_hinge) /
+                          arm + travel * believed.disturbance;
+  const double slip = -truck_.slip_compliance * speed * turn / step +
+                      (believed.gain - 1.0) * std::sin(middle) / (1.0 + std::cos(middle));
   const double advance_on_path =
       travel * std::cos(now.heading_error) / curvatureRoom(curvature, now.offset);
   const double error_growth = turn - curvature * advance_on_path;
@@ -55,21 +59,22 @@ PathState PreviewPlanner::advance(const PathState& now, double command_rate, dou
 }
 
 PreviewPlanner::Linear PreviewPlanner::linearise(const PathState& now, double rate, double speed,
-                                                 double curvature) const {
+                                                 double curvature,
+                                                 const YawResponse& believed) const {
   const double rear = truck_.geometry.rear_axle_to_hinge;
   const double front = truck_.geometry.front_axle_to_hinge;
-  const double wanted = share_ * (now.command + 0.5 * rate * step_ - now.articulation);
-  const double most = truck_.max_rate * step_;
-  const double share = std::abs(wanted) < most ? share_ : 0.0;
-  const double turn_of_hinge = std::clamp(wanted, -most, most);
+  // What follows a rate-limited command with a lag keeps to that rate: no clamp to differentiate.
+  const double share = share_;
+  const double turn_of_hinge = share * (now.command + 0.5 * rate * step_ - now.articulation);
   const double middle = now.articulation + 0.5 * turn_of_hinge;
   const double travel = speed * step_;
+  const double gain_travel = believed.gain * travel;
   const double sine = std::sin(middle);
   const double cosine = std::cos(middle);
   const double arm = front * cosine + rear;
   // The turn's derivatives: by the middle articulation, and by the hinge's own turn.
   const double by_middle =
-      (travel * cosine * arm + (travel * sine + rear * turn_of_hinge) * front * sine) / (arm * arm);
+      (gain_travel * cosine * arm + (gain_travel * sine + rear * turn_of_hinge) * front * sine) / (arm * arm);
   const double by_hinge = 0.5 * by_middle + rear / arm;
   const Vector turn(0.0, 0.0, by_middle - by_hinge * share, by_hinge * share);
   const double turn_by_rate = 0.5 * step_ * by_hinge * share;
@@ -80,57 +85,70 @@ PreviewPlanner::Linear PreviewPlanner::linearise(const PathState& now, double ra
   growth[0] = -path_turn * curvature * std::cos(now.heading_error) / room;
   growth[1] = path_turn * std::sin(now.heading_error);
   const double slip = truck_.slip_compliance * speed / step_;
+  const double half_tan = sine / (1.0 + cosine);  // tan(gamma / 2)
+  const double crab = 0.5 * (believed.gain - 1.0) * (1.0 + half_tan * half_tan);
   const double slope = travel * std::cos(now.heading_error);
 
   Linear linear;
-  linear.state.row(0) = slope * (0.5 * growth - slip * turn).transpose();
+  Vector drift = 0.5 * growth - slip * turn;
+  drift[2] += crab * (1.0 - 0.5 * share);
+  drift[3] += crab * 0.5 * share;
+  linear.state.row(0) = slope * drift.transpose();
   linear.state.row(1) = growth.transpose();
   linear.state.row(2) << 0.0, 0.0, -share, share;
   linear.state.row(3).setZero();
   linear.state.diagonal().array() += 1.0;
   linear.state(0, 1) += slope;
-  linear.rate << slope * (0.5 - slip) * turn_by_rate, turn_by_rate, 0.5 * step_ * share, step_;
+  const double drift_by_rate = (0.5 - slip) * turn_by_rate + crab * 0.25 * share * step_;
+  linear.rate << slope * drift_by_rate, turn_by_rate, 0.5 * step_ * share, step_;
   return linear;
 }
 
-double PreviewPlanner::cost(const PathState& state, double curvature, double speed) const {
-  const double course = state.heading_error - courseOffset(speed, curvature);
+double PreviewPlanner::courseOffset(double speed, double curvature, const YawResponse& believed) const {
+  const double wheelbase = truck_.geometry.front_axle_to_hinge + truck_.geometry.rear_axle_to_hinge;
+  return truck_.slip_compliance * speed * speed * curvature +
+         0.5 * (1.0 - believed.gain) * curvature * wheelbase / believed.gain;
+}
+
+double PreviewPlanner::cost(const PathState& state, double curvature, double speed,
+                            const YawResponse& believed) const {
+  const double course = state.heading_error - courseOffset(speed, curvature, believed);
   return weights_.offset * state.offset * state.offset + weights_.heading * course * course;
 }
 
 double PreviewPlanner::roll(const PathState& now, const geometry::Path& path, double speed,
-                            double disturbance, bool correct) {
+                            const YawResponse& believed, double correction) {
   PathCursor cursor(path, now.s);
   PathState state = now;
   double heading = cursor.headingAt(state.s);
   double sum = 0.0;
   const double least_step = 0.1 * speed * step_;
   for (std::size_t k = 0; k < kStages; ++k) {
-    if (correct) {
-      const PathState& before = states_[k];
+    if (correction > 0.0) {
+      const PathState& before = nominal_[k];
       const Vector change(state.offset - before.offset, state.heading_error - before.heading_error,
                           state.articulation - before.articulation, state.command - before.command);
-      rates_[k] = std::clamp(rates_[k] + corrections_[k] + gains_[k].dot(change), -truck_.max_rate,
-                             truck_.max_rate);
+      rates_[k] = std::clamp(nominal_rates_[k] + correction * corrections_[k] + gains_[k].dot(change),
+                             -rateLimit(k), rateLimit(k));
     }
     const double ahead =
         std::max(least_step, speed * step_ * std::cos(state.heading_error));
     const double next_heading = cursor.headingAt(state.s + ahead);
     curvatures_[k] = (next_heading - heading) / ahead;
     states_[k] = state;
-    state = advance(state, rates_[k], speed, curvatures_[k], disturbance, step_);
+    state = advance(state, rates_[k], speed, curvatures_[k], believed, step_);
     heading = cursor.headingAt(state.s);
     const double factor = k + 1 == kStages ? weights_.terminal : 1.0;
-    sum += factor * cost(state, curvatures_[k], speed) + weights_.rate * rates_[k] * rates_[k];
+    sum += factor * cost(state, curvatures_[k], speed, believed) + weights_.rate * rates_[k] * rates_[k];
   }
   states_[kStages] = state;
   return sum;
 }
 
-void PreviewPlanner::sweep(double speed) {
+void PreviewPlanner::sweep(double speed, const YawResponse& believed) {
   const auto gradient = [&](std::size_t k, double factor) {
     const PathState& state = states_[k + 1];
-    const double course = state.heading_error - courseOffset(speed, curvatures_[k]);
+    const double course = state.heading_error - courseOffset(speed, curvatures_[k], believed);
     return Vector(factor * weights_.offset * state.offset, factor * weights_.heading * course, 0.0, 0.0);
   };
   Vector value = Vector::Zero();
@@ -141,14 +159,14 @@ void PreviewPlanner::sweep(double speed) {
     curvature_of_value(0, 0) += factor * weights_.offset;
     curvature_of_value(1, 1) += factor * weights_.heading;
 
-    const Linear linear = linearise(states_[k], rates_[k], speed, curvatures_[k]);
+    const Linear linear = linearise(states_[k], rates_[k], speed, curvatures_[k], believed);
     const Vector by_rate = curvature_of_value * linear.rate;
     const double slope = weights_.rate * rates_[k] + value.dot(linear.rate);
     const double bend = weights_.rate + linear.rate.dot(by_rate);
     const Vector mixed = linear.state.transpose() * by_rate;
     const double free_correction = -slope / bend;
     corrections_[k] =
-        std::clamp(free_correction, -truck_.max_rate - rates_[k], truck_.max_rate - rates_[k]);
+        std::clamp(free_correction, -rateLimit(k) - rates_[k], rateLimit(k) - rates_[k]);
     const bool clamped = corrections_[k] != free_correction;
     gains_[k] = clamped ? Vector::Zero().eval() : (-mixed / bend).eval();
 
@@ -165,16 +183,19 @@ void PreviewPlanner::shift(double elapsed) {
 }
 
 double PreviewPlanner::plan(const PathState& now, const geometry::Path& path, double speed,
-                            double disturbance, double elapsed) {
+                            const YawResponse& believed, double elapsed) {
   shift(elapsed);
-  const double before = roll(now, path, speed, disturbance, false);
-  sweep(speed);
-  const std::array<double, kStages> shifted = rates_;
-  const double after = roll(now, path, speed, disturbance, true);
-  if (!(after <= before)) {  // also when the sweep went astray into NaN
-    rates_ = shifted;
-    if (!std::isfinite(before)) reset();
+  const double before = roll(now, path, speed, believed, 0.0);
+  sweep(speed, believed);
+  nominal_ = states_;
+  nominal_rates_ = rates_;
+  double correction = 1.0;
+  while (correction > kLeastCorrection) {
+    if (roll(now, path, speed, believed, correction) <= before) return rates_[0];
+    correction *= 0.5;
   }
+  rates_ = nominal_rates_;  // no better plan was found, or something is not finite
+  if (!std::isfinite(before)) reset();
   return rates_[0];
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -36,7 +37,8 @@ class PathCursor {
 
  private:
   double turn() const {
-    return geometry::wrapAngle(points_[segment_ + 1].heading - points_[segment_].heading);
+    const double turn = points_[segment_ + 1].heading - points_[segment_].heading;
+    return std::abs(turn) < M_PI ? turn : geometry::wrapAngle(turn);
   }
 
   const std::vector<geometry::PathPoint>& points_;

@@ -7,6 +7,7 @@
 #include "tunnel_pilot/drivers/driver.h"
 #include "tunnel_pilot/drivers/motion_history.h"
 #include "tunnel_pilot/drivers/preview_planner.h"
+#include "tunnel_pilot/drivers/yaw_observer.h"
 #include "tunnel_pilot/vehicle/truck_parameters.h"
 
 namespace tunnel_pilot::drivers {
@@ -23,14 +24,15 @@ struct PreviewDriverParameters {
   double transport_delay;   ///< command to steering valve: cycle, bus, controller [s]
   double lag;               ///< of the steering [s]
   double dead_band;         ///< full width, lost on a reversal of the command [rad]
+  double lead;              ///< of the command before the articulation it will meet, at most [rad]
   double max_rate;          ///< of the steering [rad/s]
   double max_articulation;  ///< highest command [rad]
   double slip_compliance;   ///< tyre slip angle per lateral acceleration [rad s^2/m]
   double offset_time;       ///< memory of the offset filter [s]
   double heading_time;      ///< memory of the heading filter [s]
-  double disturbance_time;  ///< memory of the curvature disturbance [s]
-  double max_disturbance;   ///< [1/m]
-  double follow_tolerance;  ///< beyond this the truck is taken not to follow this driver [rad]
+  double bias_time;         ///< memory of the articulation sensor's bias [s]
+  double max_bias;          ///< [rad]
+  YawObserverParameters yaw;
 };
 
 /// Reads and checks config/preview_driver.yaml. Throws config::ConfigError.
@@ -38,12 +40,13 @@ PreviewDriverParameters loadPreviewDriver(config::Node node);
 
 /// Drives along the measured centerline as a driver does who looks ahead (optimal preview). Each scan it
 /// 1. filters offset and heading error: predicted by odometry from scan to scan, corrected by the scan;
-/// 2. measures the curvature that the truck drives beside what its articulation says (slip, sensor bias);
+/// 2. learns the articulation sensor's bias against standing commands, and how the truck's yaw rate
+///    answers the articulation (YawObserver);
 /// 3. brings the truck from the scan's time to now by odometry, and over the steering's dead time by the
 ///    truck's model and the commands already given;
 /// 4. plans the command's rate over the horizon (PreviewPlanner) and commands its first moment.
-/// While another one steers, the given commands are dropped for the measured articulation, so that the
-/// driver takes over from where the articulation stands.
+/// While another one steers, the command stays within `lead` of the measured articulation, so that the
+/// driver takes over from where it stands.
 /// Invalid proposals: no valid or fresh tunnel, no motion, non-finite input. Never throws, allocates
 /// nothing after construction.
 class PreviewDriver {
@@ -54,7 +57,7 @@ class PreviewDriver {
   Proposal propose(const perception::Tunnel& tunnel, const Motion& motion, Stamp now);
   void reset();
 
-  const PreviewPlanner& planner() const { return planner_; }
+  YawResponse learned() const { return yaw_.response(); }
 
  private:
   struct Errors {
@@ -68,7 +71,8 @@ class PreviewDriver {
   bool usable(const perception::Tunnel& tunnel, const Motion& motion, Stamp now) const;
   Errors filterErrors(const perception::Tunnel& tunnel, const geometry::Pose& scan_pose);
   /// Errors after a movement `step` (in the truck's frame) beside a path of this curvature.
-  Errors carried(const Errors& from, const geometry::Pose& step, double curvature, double elapsed) const;
+  Errors carried(const Errors& from, const geometry::Pose& step, double curvature, double elapsed,
+                 double articulation) const;
   void learnFrom(const Motion& motion);
   PathState predict(const perception::Tunnel& tunnel, const geometry::Pose& scan_pose,
                     const Errors& errors, const Motion& motion, Stamp now) const;
@@ -80,14 +84,15 @@ class PreviewDriver {
   PreviewDriverParameters parameters_;
   vehicle::TruckGeometry geometry_;
   PreviewPlanner planner_;
+  YawObserver yaw_;
   MotionHistory history_;
 
   std::array<Given, 64> given_{};  ///< commands given, a ring
   std::size_t newest_ = 0;
   std::optional<Stamp> last_time_;    ///< of the last proposal
-  std::optional<Motion> last_motion_;
-  double expected_articulation_ = 0.0;  ///< if the truck follows the commands [rad]
-  double disturbance_ = 0.0;            ///< d [1/m]
+  std::optional<Motion> last_motion_;  ///< its articulation freed of the bias
+  double commanded_articulation_ = 0.0; ///< what the commands given should have made of it by now [rad]
+  double bias_ = 0.0;                   ///< of the measured articulation against the commands [rad]
   double play_ = 0.0;                   ///< added to the command to cross the dead band [rad]
 
   std::optional<geometry::Pose> last_scan_pose_;  ///< odom

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 
@@ -29,21 +30,31 @@ struct TruckResponse {
   double slip_compliance;  ///< tyre slip angle per lateral acceleration, 1/(g C) [rad s^2/m]
 };
 
+/// How the yaw rate was measured to answer, beside what the kinematics say.
+struct YawResponse {
+  double gain = 1.0;         ///< g, on the part that steady articulation gives [1]
+  double disturbance = 0.0;  ///< d, sensor bias and slope of the road [1/m]
+};
+
 struct PreviewWeights {
   double offset;    ///< [1/m^2]
   double heading;   ///< [1/rad^2]
   double rate;      ///< of the command's rate [s^2/rad^2]
   double terminal;  ///< factor on offset and heading at the horizon's end [1]
+  double rate_share;  ///< of max_rate that is planned with late in the horizon [1]
 };
 
 /// Optimal preview: finds the command rates w over the horizon that minimise
 ///   sum of  q_y e_y^2 + q_psi (e_psi + beta)^2 + r w^2
-/// along the previewed path, under |w| <= max_rate, for the truck's exact kinematics
-///   theta_dot = (v sin(gamma) + l_r gamma_dot) / (l_f cos(gamma) + l_r) + v d
-///   e_psi_dot = theta_dot - v kappa cos(e_psi) / (1 - kappa e_y),   beta = -v theta_dot / (g C)
+/// along the previewed path, under |w| <= max_rate (later in the horizon less, which leaves room for what
+/// the model does not know), for the truck's exact kinematics
+///   theta_dot = (g v sin(gamma) + l_r gamma_dot) / (l_f cos(gamma) + l_r) + v d
+///   e_psi_dot = theta_dot - v kappa cos(e_psi) / (1 - kappa e_y)
+///   beta      = -v theta_dot / (g_0 C) + (g - 1) tan(gamma / 2)
 ///   e_y_dot   = v sin(e_psi + beta),   gamma_dot = sat((u - gamma) / lag),   u_dot = w
-/// (Corke & Ridley 2001 in path-error form, with the tyres' quasi-static slip angle beta and a measured
-/// curvature disturbance d). On a path that the steering can follow the optimum is the exact curvature
+/// (Corke & Ridley 2001 in path-error form). g and d are measured. beta is the front axle's slip angle:
+/// the tyres' quasi-static one, with C their cornering coefficient, and what a yaw gain g other than 1
+/// tells of the slip if both axles share it alike (v_y = -v_yr in the slip form of the kinematics). On a path that the steering can follow the optimum is the exact curvature
 /// inversion; where the path's curvature steps, it steers ahead and rounds the step off.
 /// Method: one differential-dynamic-programming sweep with a clamped scalar control (Tassa, Mansard &
 /// Todorov 2014, "Control-limited DDP") per call, started from the last call's solution shifted in time.
@@ -54,14 +65,14 @@ class PreviewPlanner {
   PreviewPlanner(const TruckResponse& truck, const PreviewWeights& weights, double step);
 
   /// Command rate to apply from now on [rad/s]. `elapsed` [s] since the last plan shifts the start; speed
-  /// [m/s] is held over the horizon, `disturbance` is d [1/m]. The path must not be empty.
-  double plan(const PathState& now, const geometry::Path& path, double speed, double disturbance,
+  /// [m/s] is held over the horizon. The path must not be empty.
+  double plan(const PathState& now, const geometry::Path& path, double speed, const YawResponse& believed,
               double elapsed);
   void reset();
 
   /// One step of the model with the mean curvature of the path over the step.
   PathState advance(const PathState& state, double command_rate, double speed, double curvature,
-                    double disturbance, double step) const;
+                    const YawResponse& believed, double step) const;
 
   double horizon() const { return kStages * step_; }  ///< [s]
   /// State that the plan reaches after `stage` steps.
@@ -72,17 +83,19 @@ class PreviewPlanner {
   struct Linear;                   ///< derivatives of one step
 
   void shift(double elapsed);
-  /// Follows the plan from `now`; with `correct`, the last sweep's corrections are applied to it.
-  /// Returns the cost.
-  double roll(const PathState& now, const geometry::Path& path, double speed, double disturbance,
-              bool correct);
-  void sweep(double speed);
-  Linear linearise(const PathState& state, double rate, double speed, double curvature) const;
-  /// Heading error with which the course follows a path of this curvature despite tyre slip [rad].
-  double courseOffset(double speed, double curvature) const {
-    return truck_.slip_compliance * speed * speed * curvature;
+  /// Follows the plan from `now`; with a `correction` above 0, first changes it by that share of the last
+  /// sweep's corrections. Returns the cost.
+  double roll(const PathState& now, const geometry::Path& path, double speed, const YawResponse& believed,
+              double correction);
+  void sweep(double speed, const YawResponse& believed);
+  Linear linearise(const PathState& state, double rate, double speed, double curvature,
+                   const YawResponse& believed) const;
+  double rateLimit(std::size_t stage) const {
+    return truck_.max_rate * std::max(weights_.rate_share, 1.0 - 0.05 * static_cast<double>(stage));
   }
-  double cost(const PathState& state, double curvature, double speed) const;
+  /// Heading error with which the course follows a path of this curvature despite the slip [rad].
+  double courseOffset(double speed, double curvature, const YawResponse& believed) const;
+  double cost(const PathState& state, double curvature, double speed, const YawResponse& believed) const;
 
   TruckResponse truck_;
   PreviewWeights weights_;
@@ -91,6 +104,8 @@ class PreviewPlanner {
   std::array<double, kStages> rates_{};       ///< the plan [rad/s]
   std::array<double, kStages> curvatures_{};  ///< met on the way [1/m]
   std::array<PathState, kStages + 1> states_{};
+  std::array<double, kStages> nominal_rates_{};  ///< before the last sweep's correction
+  std::array<PathState, kStages + 1> nominal_{};
   std::array<double, kStages> corrections_{};  ///< of the last sweep [rad/s]
   std::array<Vector, kStages> gains_{};        ///< feedback of the last sweep
 };
