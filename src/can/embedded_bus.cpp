@@ -63,8 +63,9 @@ bool forEachSocket(const std::string& folder, const Visit& visit) {
   DIR* directory = opendir(folder.c_str());
   if (directory == nullptr) return false;
   while (const dirent* entry = readdir(directory)) {
-    const std::string file = entry->d_name;
-    if (file.size() > 5 && file.compare(file.size() - 5, 5, ".sock") == 0) visit(folder + "/" + file);
+    std::string path = folder;
+    path.append("/").append(entry->d_name);
+    if (path.compare(path.size() - 5, 5, ".sock") == 0) visit(path);
   }
   closedir(directory);
   return true;
