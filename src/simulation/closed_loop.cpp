@@ -9,7 +9,8 @@ constexpr double kRollUp = 2.5;           // long enough for all inputs to be he
 constexpr double kEngageRetry = 0.1;      // [s]
 constexpr double kEngageTimeout = 10.0;   // [s]
 constexpr double kFramesOnTheWay = 0.02;  // between the operator's edge and the truck obeying [s]
-constexpr double kSpeedGain = 2.0;        // of the one who drives up [1/s]
+constexpr double kSpeedGain = 2.0;        // of the one who drives up [1/s] ...
+constexpr double kSpeedIntegral = 0.5;    // ... who holds against rolling resistance [1/s^2]
 
 }  // namespace
 
@@ -33,6 +34,12 @@ void ClosedLoop::step() {
   if (events.truth && driving_) record();
 }
 
+void ClosedLoop::driveUp(double speed) {
+  const double error = speed - simulator_.state().speed;
+  missed_way_ += error * simulator_.parameters().step;
+  simulator_.lead(vehicle::PlantInput{0.0, kSpeedGain * error + kSpeedIntegral * missed_way_});
+}
+
 bool ClosedLoop::handOver(const geometry::Pose& start, double speed) {
   const bool rolling = speed > 0.0;
   simulator_.place(start.compose({-speed * kRollUp, 0.0, 0.0}), speed);
@@ -46,7 +53,7 @@ bool ClosedLoop::handOver(const geometry::Pose& start, double speed) {
       accepted = pilot_.engage(simulator_.now()).accepted;
       next_try = now + kEngageRetry;
     }
-    if (rolling) simulator_.lead(vehicle::PlantInput{0.0, kSpeedGain * (speed - simulator_.state().speed)});
+    if (rolling) driveUp(speed);
     step();
   }
   simulator_.lead({});

@@ -44,6 +44,9 @@ class ClosedLoop {
   std::vector<TrackSample> track_;
 
  private:
+  void driveUp(double speed);
+
+  double missed_way_ = 0.0;  ///< speed error integrated while driving up [m]
   Stamp next_tick_{};
   Stamp start_time_{};
   std::uint32_t start_contacts_ = 0;

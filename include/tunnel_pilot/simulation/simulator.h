@@ -85,6 +85,7 @@ class Simulator {
   const Truth& truthOfScan() const { return scan_truth_; }
   const vehicle::PlantState& state() const { return plant_->state(); }
   const world::World& world() const { return world_; }
+  const SimulatorParameters& parameters() const { return parameters_; }
   const LidarModel& lidar() const { return lidar_; }
   /// World file's start pose, or where (station, offset, heading error) lie on the design line.
   geometry::Pose startPose() const { return world_.start; }
