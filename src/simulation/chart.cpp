@@ -139,7 +139,7 @@ void Chart::drawAxes(cv::Mat& image, const Frame& frame) const {
   const cv::Rect& box = frame.box;
   const double x_step = roundStep((frame.x_high - frame.x_low) * kTickTarget * kOversampling / box.width);
   const double y_step =
-      roundStep((frame.y_high - frame.y_low) * 0.6 * kTickTarget * kOversampling / box.height);
+      roundStep((frame.y_high - frame.y_low) * 0.4 * kTickTarget * kOversampling / box.height);
   for (double x = std::ceil(frame.x_low / x_step) * x_step; x <= frame.x_high; x += x_step) {
     const int column = static_cast<int>(std::lround(frame.x(x)));
     cv::line(image, {column, box.y}, {column, box.br().y}, colour::kGrid, kOversampling);

@@ -189,6 +189,15 @@ std::vector<const EpisodeResult*> pictured(const Scenario& scenario,
   return {order[order.size() / 2 - (order.size() % 2 == 0 ? 1 : 0)], order.back()};
 }
 
+// What an earlier report left would stand beside this one's files as if it belonged to it.
+void removeEpisodeFiles(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> old;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.path().filename().string().rfind("seed_", 0) == 0) old.push_back(entry.path());
+  }
+  for (const std::filesystem::path& file : old) std::filesystem::remove(file);
+}
+
 std::string padded(const std::string& text, std::size_t width, bool right) {
   const std::string space(width > text.size() ? width - text.size() : 0, ' ');
   return right ? space + text : text + space;
@@ -241,6 +250,7 @@ void writeReport(const std::string& folder, const Scenario& scenario, const Eval
   std::error_code error;
   std::filesystem::create_directories(path, error);
   if (error) throw std::runtime_error("cannot make folder '" + folder + "': " + error.message());
+  removeEpisodeFiles(path);
   writeSummary(path, scenario, evaluation, episodes, fingerprints);
   writeEpisodes(path, episodes);
   for (const EpisodeResult& episode : episodes) {
