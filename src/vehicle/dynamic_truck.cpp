@@ -35,7 +35,7 @@ DynamicTruck::DynamicTruck(const TruckParameters& parameters, const DynamicTruck
   if (options.rough_road) {
     road_ = std::make_shared<const RoadProfile>(parameters.road_roughness, options.road_seed);
   }
-  reset({}, 0.0, 0.0);
+  DynamicTruck::reset({}, 0.0, 0.0);
 }
 
 void DynamicTruck::reset(const geometry::Pose& pose, double articulation, double speed) {
