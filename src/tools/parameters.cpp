@@ -1,0 +1,62 @@
+// Prints every parameter of the shipped configuration as one JSON list: file, key, value, unit, range. The
+// loaders themselves tell unit and range; scripts/generate_parameter_docs makes the tables from it.
+
+#include <exception>
+#include <functional>
+#include <iostream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "tunnel_pilot/bridge/bridge_parameters.h"
+#include "tunnel_pilot/config/node.h"
+#include "tunnel_pilot/drivers/preview_driver.h"
+#include "tunnel_pilot/perception/centerline.h"
+#include "tunnel_pilot/perception/scan_filter.h"
+#include "tunnel_pilot/perception/wall_segmentation.h"
+#include "tunnel_pilot/simulation/simulator.h"
+#include "tunnel_pilot/simulation/truck_controller.h"
+#include "tunnel_pilot/supervision/arbiter.h"
+#include "tunnel_pilot/vehicle/truck_parameters.h"
+
+namespace {
+
+using namespace tunnel_pilot;  // NOLINT: a program, not a header
+
+const std::vector<std::pair<std::string, std::function<void(const config::Node&)>>> kLoaders = {
+    {"truck", [](const config::Node& node) { vehicle::loadTruck(node); }},
+    {"scan_filter", [](const config::Node& node) { perception::loadScanFilter(node); }},
+    {"wall_segmentation", [](const config::Node& node) { perception::loadWallSegmentation(node); }},
+    {"centerline", [](const config::Node& node) { perception::loadCenterline(node); }},
+    {"preview_driver", [](const config::Node& node) { drivers::loadPreviewDriver(node); }},
+    {"arbiter", [](const config::Node& node) { supervision::loadArbiter(node); }},
+    {"can_bridge", [](const config::Node& node) { bridge::loadBridge(node); }},
+    {"simulator", [](const config::Node& node) { simulation::loadSimulator(node); }},
+    {"truck_controller", [](const config::Node& node) { simulation::loadTruckController(node); }},
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::cerr << "usage: parameters CONFIG_FOLDER\n";
+    return 2;
+  }
+  try {
+    nlohmann::ordered_json list = nlohmann::ordered_json::array();
+    for (const auto& [name, load] : kLoaders) {
+      const config::Node node = config::loadFile(std::string(argv[1]) + "/" + name + ".yaml");
+      load(node);
+      for (const config::ParameterRecord& r : node.records()) {
+        list.push_back({{"file", name}, {"key", r.key}, {"value", r.value}, {"unit", r.unit}, {"range", r.range}});
+      }
+    }
+    std::cout << list.dump(1) << "\n";
+  } catch (const std::exception& e) {
+    std::cerr << e.what() << "\n";
+    return 1;
+  }
+  return 0;
+}
