@@ -7,7 +7,7 @@ namespace {
 
 using config::Node;
 
-constexpr int kMaxDraws = 500;
+constexpr int kMaxDraws = 200;
 constexpr std::uint64_t kLayoutStream = 3;
 
 struct Range {
@@ -108,7 +108,7 @@ class Layout {
 
 void drawRandomTunnel(Node& world, TunnelPlan& plan) {
   const LayoutRanges ranges = readRanges(world);
-  plan.separation = world.number("separation", "m", 0.0, 100.0);
+  plan.separation = world.number("separation", "m", 0.0, 10.0);
   Draws draws(plan.seed, kLayoutStream);
   std::string conflict;
   for (int i = 0; i < kMaxDraws; ++i) {
