@@ -13,7 +13,6 @@ using geometry::Point;
 using geometry::Pose;
 
 constexpr double kSeenComing = 2.5;     // [m] along the tunnel, between a width expected and met
-constexpr double kSmoothReach = 0.5;    // [m]
 constexpr std::size_t kFewestInFit = 4;  // nodes in a parabola's window
 
 bool isFinite(const Pose& pose) {
@@ -127,7 +126,10 @@ const Tunnel& CenterlineEstimator::update(const Walls& walls, const std::optiona
     nodes_ = measured_;
   }
   fitPath();
-  if (path_.back().s - path_.front().s < parameters_.length_min) return refuse(TunnelReason::kPoorFit);
+  if (!isPlausible()) {
+    memory_.clear();
+    return refuse(TunnelReason::kPoorFit);
+  }
   fillState(walls);
   return tunnel_;
 }
@@ -277,8 +279,7 @@ void CenterlineEstimator::fitPath() {
   path_.clear();
   std::size_t first = 0;
   std::size_t last = 0;
-  // One scan's curve is smooth already: its own derivatives are better than a wide parabola's at its end.
-  const double reach = memory_.empty() ? kSmoothReach : parameters_.fit_reach;
+  const double reach = parameters_.fit_reach;
   const std::size_t end = nodes_.size() - 1;
   for (std::size_t i = 0; i <= end; ++i) {
     const auto distance = [&](std::size_t k) { return (nodes_[k].position - nodes_[i].position).norm(); };
@@ -305,6 +306,21 @@ void CenterlineEstimator::fitPath() {
                      2.0 * fit.coefficients(2) / std::pow(1.0 + b * b, 1.5)});
   }
   prolongBackwards();
+}
+
+// A tunnel is long enough, finite and without kinks.
+bool CenterlineEstimator::isPlausible() const {
+  constexpr double kKink = 0.4;  // [rad] between neighbouring samples
+  for (std::size_t i = 0; i < path_.size(); ++i) {
+    const PathPoint& p = path_[i];
+    const bool finite = std::isfinite(p.s) && std::isfinite(p.x) && std::isfinite(p.y) &&
+                        std::isfinite(p.heading) && std::isfinite(p.curvature);
+    if (!finite) return false;
+    if (i == 0) continue;
+    if (!(p.s > path_[i - 1].s)) return false;
+    if (std::abs(geometry::wrapAngle(p.heading - path_[i - 1].heading)) > kKink) return false;
+  }
+  return path_.back().s - path_.front().s >= parameters_.length_min;
 }
 
 // Back to beside the reference point, at the first sample's curvature.

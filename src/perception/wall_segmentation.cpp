@@ -17,6 +17,7 @@ namespace {
 
 constexpr std::size_t kMaxNodes = 100;      // slices across the tunnel
 constexpr double kUnseenBeforeWidening = 2.0;  // [m] without either wall before another width is looked for
+constexpr double kTaperCoverage = 0.3;    // of the slice's length
 constexpr double kWideningLength = 5.0;     // [m] over which it must show
 constexpr double kWideningDeviation = 0.2;  // [m] of the new walls' places
 constexpr double kCoverageMin = 0.1;          // of a slice's length
@@ -24,13 +25,21 @@ constexpr double kHuber = 1.5;               // deviations beyond which a slice 
 constexpr double kCurveSpacing = 0.5;  // [m] of the fitted curves' samples
 // With so much of the near stretch seen on the better wall, the last scan's tunnel holds; with so much on
 // the worse, both walls do.
-constexpr double kTrackedSupport = 0.7;
-constexpr double kPairedSupport = 0.4;
+constexpr double kTrackedSupport = 0.6;
+constexpr double kPairedSupport = 0.35;
 constexpr int kUnpairedScansMax = 150;
 constexpr double kWidthDeviationMin = 0.03;  // [m] of the last scan's half width
 constexpr double kWidthDeviationMax = 0.10;  // [m]
 constexpr Stamp kGuessAge = std::chrono::milliseconds(500);
 constexpr std::array<double, 2> kSides = {1.0, -1.0};
+
+// Returns near to where a wall is expected in one slice.
+struct WallSlice {
+  CorridorSmoother::Slice mean;
+  int groups = 0;
+  double coverage = 0.0;  // share of the slice's length
+  double outward = 0.0;   // of the expected wall [m]
+};
 
 double square(double x) { return x * x; }
 
@@ -61,6 +70,7 @@ WallSegmentationParameters loadWallSegmentation(config::Node node) {
   p.gate_min = node.number("gate_min", "m", 0.01, 2.0);
   p.gate_max = node.number("gate_max", "m", 0.01, 2.0);
   if (p.gate_max < p.gate_min) node.refuse("gate_max", "must not be below gate_min");
+  p.width_change_min = node.number("width_change_min", "m", 0.01, 2.0);
   p.gap_max = node.number("gap_max", "m", 0.5, 20.0);
   p.wall_length_min = node.number("wall_length_min", "m", 0.5, 20.0);
   p.wall_coverage_min = node.number("wall_coverage_min", "1", 0.0, 1.0);
@@ -90,7 +100,7 @@ struct WallSegmentation::Impl {
   std::vector<PointGroup> groups;
   std::vector<int> order;                            // finite points of the input, as indices
   std::array<std::vector<std::int8_t>, 2> taken;     // by side and group: the node it was taken for, or -1
-  std::array<std::vector<unsigned char>, 2> seen;    // by side and node: the wall was measured there
+  std::array<std::vector<float>, 2> seen;            // by side and node: share of the slice that shows the wall
 
   void group(const pcl::PointCloud<pcl::PointXYZ>& cloud, const std::vector<int>& indices);
   std::optional<CorridorNode> guess;                 // where the last scan's tunnel began
@@ -107,12 +117,18 @@ struct WallSegmentation::Impl {
   void clear();
   Support support() const;
   bool widen(std::size_t node);
-  bool measure(std::size_t side);
+  bool measureSlice(const std::array<bool, 2>& followed);
+  double deviationOf(std::size_t side) const;
+  double gateOf(std::size_t side) const;
+  WallSlice lookForWall(std::size_t side, double gate);
+  bool movedAlike(const std::array<WallSlice, 2>& slices) const;
+  void taper(std::array<WallSlice, 2>& slices);
+  void measure(std::size_t side, const WallSlice& slice);
   std::size_t firstSeen() const;
-  void finish(const pcl::PointCloud<pcl::PointXYZ>& cloud, int side, std::size_t first, Wall& wall);
-  void collectInliers(const pcl::PointCloud<pcl::PointXYZ>& cloud, int side, Wall& wall);
-  bool isWall(int side) const;
-  void drawCurve(int side, std::size_t first, std::size_t last, Wall& wall) const;
+  void finish(const pcl::PointCloud<pcl::PointXYZ>& cloud, std::size_t side, std::size_t first, Wall& wall);
+  void collectInliers(const pcl::PointCloud<pcl::PointXYZ>& cloud, std::size_t side, Wall& wall);
+  bool isWall(std::size_t side) const;
+  void drawCurve(std::size_t side, std::size_t first, std::size_t last, Wall& wall) const;
 };
 
 WallSegmentation::WallSegmentation(const WallSegmentationParameters& parameters)
@@ -249,14 +265,13 @@ void WallSegmentation::Impl::keepGuess(Stamp stamp, const Walls& walls) {
 WallSegmentation::Impl::Support WallSegmentation::Impl::support() const {
   const auto near = static_cast<std::size_t>(p.seed_radius / p.step);
   std::size_t first = 0;
-  while (first < near && first < seen[0].size() && !seen[0][first] && !seen[1][first]) ++first;
+  while (first < near && first < seen[0].size() && seen[0][first] + seen[1][first] == 0.0F) ++first;
   std::array<double, 2> share{};
   for (std::size_t side = 0; side < 2; ++side) {
-    const std::vector<unsigned char>& slices = seen[side];
-    const std::size_t last = std::min(first + near, slices.size());
-    const auto count = std::count(slices.begin() + static_cast<std::ptrdiff_t>(std::min(first, last)),
-                                  slices.begin() + static_cast<std::ptrdiff_t>(last), 1);
-    share[side] = static_cast<double>(count) / static_cast<double>(near);
+    const std::vector<float>& slices = seen[side];
+    double count = 0.0;
+    for (std::size_t i = first; i < std::min(first + near, slices.size()); ++i) count += slices[i];
+    share[side] = count / static_cast<double>(near);
   }
   return {std::max(share[0], share[1]), std::min(share[0], share[1]), share[0] >= share[1]};
 }
@@ -292,12 +307,7 @@ void WallSegmentation::Impl::follow(const CorridorNode& start, const CorridorSmo
   std::size_t unseen = 0;        // slices without either wall, at the end
   std::size_t widened_at = 0;    // node at which a change of width was looked for last
   while (smoother.size() <= nodes) {
-    bool any = false;
-    for (std::size_t side = 0; side < 2; ++side) {
-      const bool measured = followed[side] && measure(side);
-      seen[side].push_back(static_cast<unsigned char>(measured));
-      any = any || measured;
-    }
+    const bool any = measureSlice(followed);
     unseen = any ? 0 : unseen + 1;
     if (static_cast<double>(unseen) * p.step > p.gap_max) break;
     const std::size_t first_unseen = smoother.size() - unseen;
@@ -324,77 +334,120 @@ bool WallSegmentation::Impl::widen(std::size_t node) {
   if (width < p.width_min || width > p.width_max || std::abs(shift) > p.gate_max) return false;
   smoother.rewind(node + 1);
   smoother.step(shift, 0.5 * width, kWideningDeviation);
-  for (std::vector<unsigned char>& slices : seen) slices.resize(node);
+  for (std::vector<float>& slices : seen) slices.resize(node);
   return true;
 }
 
-bool WallSegmentation::Impl::measure(std::size_t side) {
-  const double sign = kSides[side];
-  const CorridorNode node = smoother.last();
-  const double deviation = std::sqrt(smoother.expectedVariance(sign) + square(p.wall_deviation));
-  const double gate = std::clamp(3.0 * deviation, p.gate_min, p.gate_max);
-  const double middle = sign * node.half_width;
-  CorridorSmoother::Slice slice;
-  int count = 0;
-  float nearest = std::numeric_limits<float>::max();
-  float farthest = std::numeric_limits<float>::lowest();
+// Measures the walls in the last node's slice; true when any was seen.
+bool WallSegmentation::Impl::measureSlice(const std::array<bool, 2>& followed) {
+  std::array<WallSlice, 2> slices;
+  for (std::size_t side = 0; side < 2; ++side) {
+    if (followed[side]) slices[side] = lookForWall(side, gateOf(side));
+  }
+  const bool lost = slices[0].groups * slices[1].groups == 0;
+  if (followed[0] && followed[1] && (lost || movedAlike(slices))) taper(slices);
+  for (std::size_t side = 0; side < 2; ++side) {
+    const bool measured = slices[side].groups > 0;
+    if (measured) measure(side, slices[side]);
+    seen[side].push_back(static_cast<float>(slices[side].coverage));
+  }
+  return slices[0].groups + slices[1].groups > 0;
+}
+
+double WallSegmentation::Impl::deviationOf(std::size_t side) const {
+  return std::sqrt(smoother.expectedVariance(kSides[side]) + square(p.wall_deviation));
+}
+
+double WallSegmentation::Impl::gateOf(std::size_t side) const {
+  return std::clamp(3.0 * deviationOf(side), p.gate_min, p.gate_max);
+}
+
+WallSlice WallSegmentation::Impl::lookForWall(std::size_t side, double gate) {
+  const CorridorNode& node = smoother.last();
+  const double middle = kSides[side] * node.half_width;
   std::vector<std::int8_t>& mine = taken[side];
   const auto at = static_cast<std::int8_t>(smoother.size() - 1);
+  WallSlice slice;
+  float nearest = std::numeric_limits<float>::max();
+  float farthest = std::numeric_limits<float>::lowest();
   grid.visitSlice(groups, node.pose, 0.5 * p.step, middle - gate, middle + gate,
                   [&](int group, float along, float lateral) {
                     nearest = std::min(nearest, along);
                     farthest = std::max(farthest, along);
-                    slice.along += along;
-                    slice.along_squared += along * along;
-                    slice.lateral += lateral;
-                    ++count;
+                    slice.mean.along += along;
+                    slice.mean.along_squared += along * along;
+                    slice.mean.lateral += lateral;
+                    ++slice.groups;
                     mine[static_cast<std::size_t>(group)] = at;
                   });
-  if (count == 0) return false;
-  slice.along /= count;
-  slice.along_squared /= count;
-  slice.lateral /= count;
-  // Half a wall and half something before it make an outlier: the farther off, the less it counts (Huber).
-  const double miss = std::abs(slice.lateral - middle);
-  const double doubt = std::max(1.0, miss / (kHuber * deviation));
-  // The face of something that juts out of the wall is short along it, and so counts little.
-  const double coverage = std::clamp((farthest - nearest) / p.step, kCoverageMin, 1.0);
-  smoother.measure(sign, slice, doubt / coverage * square(p.wall_deviation));
-  return true;
+  if (slice.groups == 0) return slice;
+  slice.mean.along /= slice.groups;
+  slice.mean.along_squared /= slice.groups;
+  slice.mean.lateral /= slice.groups;
+  slice.coverage = std::clamp((farthest - nearest) / p.step, kCoverageMin, 1.0);
+  slice.outward = kSides[side] * slice.mean.lateral - node.half_width;
+  return slice;
 }
 
-bool WallSegmentation::Impl::isWall(int side) const {
-  const std::vector<unsigned char>& slices = seen[static_cast<std::size_t>(side)];
-  const auto count = std::count(slices.begin(), slices.end(), 1);
+// Both walls stand farther out, or farther in, than expected, by about as much.
+bool WallSegmentation::Impl::movedAlike(const std::array<WallSlice, 2>& slices) const {
+  const double left = slices[0].outward;
+  const double right = slices[1].outward;
+  return left * right > 0.0 && std::min(std::abs(left), std::abs(right)) >= p.width_change_min &&
+         std::abs(left - right) <= p.gate_min &&
+         std::min(slices[0].coverage, slices[1].coverage) >= kTaperCoverage;
+}
+
+// Where both walls moved alike, the tunnel's width changes; an obstacle or a bay moves only one.
+void WallSegmentation::Impl::taper(std::array<WallSlice, 2>& slices) {
+  const std::array<WallSlice, 2> wide = {lookForWall(0, p.gate_max), lookForWall(1, p.gate_max)};
+  if (!movedAlike(wide)) return;
+  const double change = 0.5 * (wide[0].outward + wide[1].outward);
+  smoother.step(0.0, smoother.last().half_width + change, p.wall_deviation);
+  slices = wide;
+}
+
+void WallSegmentation::Impl::measure(std::size_t side, const WallSlice& slice) {
+  // Half a wall and half something before it make an outlier: the farther off, the less it counts (Huber).
+  // The face of something that juts out of the wall is short along it, and so counts little.
+  const double miss = std::abs(kSides[side] * slice.mean.lateral - smoother.last().half_width);
+  const double doubt = std::max(1.0, miss / (kHuber * deviationOf(side)));
+  smoother.measure(kSides[side], slice.mean, doubt / slice.coverage * square(p.wall_deviation));
+}
+
+bool WallSegmentation::Impl::isWall(std::size_t side) const {
+  const std::vector<float>& slices = seen[side];
+  const auto is_seen = [](float share) { return share > 0.0F; };
+  const auto count = static_cast<double>(std::count_if(slices.begin(), slices.end(), is_seen));
   if (count * p.step < p.wall_length_min) return false;
-  const auto first = std::find(slices.begin(), slices.end(), 1);
-  const auto last = std::find(slices.rbegin(), slices.rend(), 1).base();
+  const auto first = std::find_if(slices.begin(), slices.end(), is_seen);
+  const auto last = std::find_if(slices.rbegin(), slices.rend(), is_seen).base();
   return count >= p.wall_coverage_min * static_cast<double>(std::distance(first, last));
 }
 
 // The first slice in which a wall was measured: both curves begin there, so that their samples pair up.
 std::size_t WallSegmentation::Impl::firstSeen() const {
   std::size_t first = smoother.size();
-  for (int side = 0; side < 2; ++side) {
+  for (std::size_t side = 0; side < 2; ++side) {
     if (!isWall(side)) continue;
-    const std::vector<unsigned char>& slices = seen[static_cast<std::size_t>(side)];
-    const auto at = std::distance(slices.begin(), std::find(slices.begin(), slices.end(), 1));
-    first = std::min(first, static_cast<std::size_t>(at));
+    for (std::size_t i = 0; i < first; ++i) {
+      if (seen[side][i] > 0.0F) first = i;
+    }
   }
   return first;
 }
 
-void WallSegmentation::Impl::finish(const pcl::PointCloud<pcl::PointXYZ>& cloud, int side,
+void WallSegmentation::Impl::finish(const pcl::PointCloud<pcl::PointXYZ>& cloud, std::size_t side,
                                     std::size_t first, Wall& wall) {
   if (!isWall(side)) return;
   wall.found = true;
-  const std::vector<unsigned char>& slices = seen[static_cast<std::size_t>(side)];
-  const auto last = std::find(slices.rbegin(), slices.rend(), 1).base();
-  drawCurve(side, first, static_cast<std::size_t>(std::distance(slices.begin(), last)) - 1, wall);
+  std::size_t last = seen[side].size() - 1;
+  while (seen[side][last] == 0.0F) --last;
+  drawCurve(side, first, last, wall);
   collectInliers(cloud, side, wall);
 }
 
-void WallSegmentation::Impl::drawCurve(int side, std::size_t first, std::size_t last, Wall& wall) const {
+void WallSegmentation::Impl::drawCurve(std::size_t side, std::size_t first, std::size_t last, Wall& wall) const {
   const int pieces = std::max(1, static_cast<int>(std::lround(p.step / kCurveSpacing)));
   for (std::size_t i = first; i <= last; ++i) {
     const CorridorNode& a = smoother.node(i);
@@ -414,19 +467,19 @@ void WallSegmentation::Impl::drawCurve(int side, std::size_t first, std::size_t 
         n.pose.heading = a.pose.heading + t * (b.pose.heading - a.pose.heading);
         n.half_width = a.half_width + t * (b.half_width - a.half_width);
       }
-      const double offset = kSides[static_cast<std::size_t>(side)] * n.half_width;
+      const double offset = kSides[side] * n.half_width;
       wall.curve.emplace_back(n.pose.x - offset * std::sin(n.pose.heading),
                               n.pose.y + offset * std::cos(n.pose.heading));
     }
   }
 }
 
-void WallSegmentation::Impl::collectInliers(const pcl::PointCloud<pcl::PointXYZ>& cloud, int side,
+void WallSegmentation::Impl::collectInliers(const pcl::PointCloud<pcl::PointXYZ>& cloud, std::size_t side,
                                             Wall& wall) {
   struct Place {
     float x, y, cosine, sine, offset, half_bend;
   };
-  const double sign = kSides[static_cast<std::size_t>(side)];
+  const double sign = kSides[side];
   std::array<Place, kMaxNodes> places;
   for (std::size_t i = 0; i < smoother.size(); ++i) {
     const CorridorNode& n = smoother.node(i);
@@ -440,7 +493,7 @@ void WallSegmentation::Impl::collectInliers(const pcl::PointCloud<pcl::PointXYZ>
                  static_cast<float>(0.5 * bend)};
   }
   const auto reach = static_cast<float>(p.inlier_distance);
-  const std::vector<std::int8_t>& node_of = taken[static_cast<std::size_t>(side)];
+  const std::vector<std::int8_t>& node_of = taken[side];
   double sum = 0.0;
   for (std::size_t g = 0; g < groups.size(); ++g) {
     if (node_of[g] < 0) continue;

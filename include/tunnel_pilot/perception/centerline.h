@@ -73,6 +73,7 @@ class CenterlineEstimator {
   void appendMeasured();
   void forgetBehind(const geometry::Pose& pose);
   void fitPath();
+  bool isPlausible() const;
   void prolongBackwards();
   void fillState(const Walls& walls);
 

@@ -26,6 +26,7 @@ struct WallSegmentationParameters {
   double width_walk = 0.0;           ///< growth of the half width's deviation with distance [m per sqrt(m)]
   double gate_min = 0.0;             ///< a return this near to the expected wall is always looked at [m]
   double gate_max = 0.0;             ///< and one farther than this never [m]
+  double width_change_min = 0.0;     ///< both walls moved alike by so much: the width changes [m]
   double gap_max = 0.0;              ///< tunnel without either wall beyond which it is not followed [m]
   double wall_length_min = 0.0;      ///< a shorter wall is none [m]
   double wall_coverage_min = 0.0;    ///< share of the slices along a wall that must show it [1]
