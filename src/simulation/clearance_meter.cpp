@@ -8,7 +8,7 @@ namespace {
 
 using geometry::Point;
 
-constexpr std::size_t kChunkSegments = 12;
+constexpr std::size_t kChunkSegments = 32;
 
 double cross(const Point& a, const Point& b) { return a.x() * b.y() - a.y() * b.x(); }
 
@@ -33,62 +33,66 @@ double segmentToSegment(const Point& a, const Point& b, const Point& c, const Po
                    pointToSegment(d, a, b)});
 }
 
-double outlineToChain(const std::vector<Point>& outline, const world::WallChain& chain) {
+double outlineToSegment(const std::vector<Point>& outline, const Point& c, const Point& d) {
   double nearest = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < outline.size(); ++i) {
-    const Point& a = outline[i];
-    const Point& b = outline[(i + 1) % outline.size()];
-    for (std::size_t j = 0; j + 1 < chain.size(); ++j) {
-      nearest = std::min(nearest, segmentToSegment(a, b, chain[j], chain[j + 1]));
-    }
+    nearest = std::min(nearest, segmentToSegment(outline[i], outline[(i + 1) % outline.size()], c, d));
   }
   return nearest;
 }
 
-// Circle round the points' bounding box.
-void boundingCircle(const std::vector<Point>& points, Point& centre, double& radius) {
-  Point low = points.front();
-  Point high = points.front();
-  for (const Point& p : points) {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
-  centre = 0.5 * (low + high);
-  radius = 0.5 * (high - low).norm();
+// True when a circle round `a` may come nearer than `distance` to one round `b`.
+bool mayBeNearer(const Point& a, const Point& b, double radii, double distance) {
+  const double reach = distance + radii;
+  return (a - b).squaredNorm() < reach * reach;
 }
 
 }  // namespace
+
+// Circle round the points' bounding box.
+ClearanceMeter::Circle ClearanceMeter::boundingCircle(const Point* points, std::size_t count) {
+  Point low = points[0];
+  Point high = points[0];
+  for (std::size_t i = 1; i < count; ++i) {
+    low = low.cwiseMin(points[i]);
+    high = high.cwiseMax(points[i]);
+  }
+  return {0.5 * (low + high), 0.5 * (high - low).norm()};
+}
 
 ClearanceMeter::ClearanceMeter(const std::vector<world::WallChain>& walls) {
   for (const world::WallChain& wall : walls) {
     for (std::size_t first = 0; first + 1 < wall.size(); first += kChunkSegments) {
       const std::size_t last = std::min(first + kChunkSegments, wall.size() - 1);
-      Chunk chunk;
-      chunk.points.assign(wall.begin() + static_cast<std::ptrdiff_t>(first),
-                          wall.begin() + static_cast<std::ptrdiff_t>(last) + 1);
-      boundingCircle(chunk.points, chunk.centre, chunk.radius);
+      Chunk chunk{boundingCircle(&wall[first], last - first + 1), {}};
+      for (std::size_t i = first; i < last; ++i) {
+        chunk.segments.push_back({boundingCircle(&wall[i], 2), wall[i], wall[i + 1]});
+      }
       chunks_.push_back(std::move(chunk));
     }
   }
 }
 
 double ClearanceMeter::clearance(const std::vector<Point>& outline) const {
-  Point centre;
-  double radius = 0.0;
-  boundingCircle(outline, centre, radius);
-  const auto atLeast = [&](const Chunk& chunk) {
-    return (chunk.centre - centre).norm() - chunk.radius - radius;
+  const Circle body = boundingCircle(outline.data(), outline.size());
+  double nearest = std::numeric_limits<double>::infinity();
+  const auto look = [&](const Chunk& chunk) {
+    for (const Segment& segment : chunk.segments) {
+      if (!mayBeNearer(segment.circle.centre, body.centre, segment.circle.radius + body.radius, nearest)) continue;
+      nearest = std::min(nearest, outlineToSegment(outline, segment.a, segment.b));
+    }
   };
   // The chunk that seems nearest first: it rules most of the others out.
+  const auto power = [&](const Chunk& chunk) {
+    return (chunk.circle.centre - body.centre).squaredNorm() - chunk.circle.radius * chunk.circle.radius;
+  };
   const auto first = std::min_element(chunks_.begin(), chunks_.end(), [&](const Chunk& a, const Chunk& b) {
-    return atLeast(a) < atLeast(b);
+    return power(a) < power(b);
   });
-  if (first == chunks_.end()) return std::numeric_limits<double>::infinity();
-  double nearest = outlineToChain(outline, first->points);
+  if (first != chunks_.end()) look(*first);
   for (const Chunk& chunk : chunks_) {
-    if (&chunk != &*first && atLeast(chunk) < nearest) {
-      nearest = std::min(nearest, outlineToChain(outline, chunk.points));
-    }
+    if (&chunk == &*first) continue;
+    if (mayBeNearer(chunk.circle.centre, body.centre, chunk.circle.radius + body.radius, nearest)) look(chunk);
   }
   return nearest;
 }

@@ -19,11 +19,20 @@ class ClearanceMeter {
   double clearance(const std::vector<geometry::Point>& outline) const;
 
  private:
-  struct Chunk {
+  struct Circle {
     geometry::Point centre;
     double radius;
-    world::WallChain points;
   };
+  struct Segment {
+    Circle circle;
+    geometry::Point a, b;
+  };
+  struct Chunk {
+    Circle circle;
+    std::vector<Segment> segments;
+  };
+  static Circle boundingCircle(const geometry::Point* points, std::size_t count);
+
   std::vector<Chunk> chunks_;
 };
 
