@@ -23,6 +23,9 @@ DustParameters loadDust(config::Node node) {
   return dust;
 }
 
+// A probability as a threshold for 32 random bits.
+std::uint64_t share32(double share) { return static_cast<std::uint64_t>(share * 0x1p32); }
+
 // Pose between two near ones; `share` 0 gives the first.
 geometry::Pose between(const geometry::Pose& first, const geometry::Pose& last, double share) {
   return {first.x + share * (last.x - first.x), first.y + share * (last.y - first.y),
@@ -61,6 +64,10 @@ LidarModel::LidarModel(const LidarParameters& parameters, std::uint64_t seed)
     : parameters_(parameters), noise_(seed, Stream::kLidar), dust_(seed, Stream::kDust),
       burst_end_(Stamp::min()) {
   bias_ = noise_.uniform(-parameters.range_bias_max, parameters.range_bias_max);
+  static const std::vector<double> levels = normalLevels(std::size_t{1} << kErrorBits);
+  std::transform(levels.begin(), levels.end(), errors_.begin(), [&](double level) {
+    return static_cast<float>(bias_ + parameters.range_sigma * level);
+  });
   dropout_ = dust_.uniform(parameters.dust.dropout_min, parameters.dust.dropout_max);
   scan_.angle_min = parameters.angle_min;
   scan_.angle_increment = parameters.angle_increment;
@@ -104,25 +111,27 @@ void LidarModel::hideBehindGround(double height, double pitch) {
   }
 }
 
-// The inner loop of the simulator: one draw of random bits a beam serves noise and dust.
+// The inner loop of the simulator: one draw of random bits a beam serves noise and dust. Only the rare
+// early return branches; the generator works on a copy, so that its state stays in registers.
 void LidarModel::addNoiseAndDust() {
-  const auto met_by_dust = static_cast<std::uint32_t>(std::min(dropout_ * 0x1p32, 0x1p32 - 1));
-  const auto early =
-      static_cast<std::uint32_t>(std::min(dropout_ * parameters_.dust.early_return_share * 0x1p32, 0x1p32 - 1));
+  const std::uint64_t met_by_dust = share32(dropout_);
+  const std::uint64_t early = share32(dropout_ * parameters_.dust.early_return_share);
   const auto range_min = static_cast<float>(parameters_.range_min);
   const auto range_max = static_cast<float>(parameters_.range_max);
+  Random noise = noise_;
   for (float& range : scan_.ranges) {
-    const std::uint64_t bits = noise_.bits();
-    const auto lot = static_cast<std::uint32_t>(bits);
-    if (lot < met_by_dust) {
-      const float wall = std::min(range, range_max);
-      range = lot < early ? range_min + (wall - range_min) * static_cast<float>(dust_.uniform()) : kNoEcho;
-      continue;
+    const std::uint64_t bits = noise.bits();
+    const std::uint64_t lot = bits & 0xFFFFFFFFu;
+    const float wall = range;
+    float measured = wall + errors_[bits >> (64 - kErrorBits)];
+    measured = measured < range_min ? -kNoEcho : measured;
+    measured = measured > range_max ? kNoEcho : measured;
+    range = lot < met_by_dust ? kNoEcho : measured;
+    if (lot < early) {
+      range = range_min + (std::min(wall, range_max) - range_min) * static_cast<float>(dust_.uniform());
     }
-    range += static_cast<float>(bias_ + parameters_.range_sigma * noise_.normalFrom(bits));
-    if (range < range_min) range = -kNoEcho;
-    if (range > range_max) range = kNoEcho;
   }
+  noise_ = noise;
 }
 
 void LidarModel::addBurst(Stamp stamp) {

@@ -38,6 +38,19 @@ std::uint64_t streamSeed(std::uint64_t seed, Stream stream) {
   return splitMix(state);
 }
 
+std::vector<double> normalLevels(std::size_t count) {
+  std::vector<double> levels(count);
+  double squares = 0.0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double share = (2.0 * static_cast<double>(i) + 1.0) / static_cast<double>(count) - 1.0;
+    levels[i] = std::copysign(halfNormalQuantile(1.0 - std::abs(share)), share);
+    squares += levels[i] * levels[i];
+  }
+  const double scale = std::sqrt(static_cast<double>(count) / squares);
+  for (double& level : levels) level = rounded(level * scale);
+  return levels;
+}
+
 Random::NormalTable::NormalTable() {
   constexpr double kCellWidth = 1.0 / kCells;
   constexpr double kTailCellWidth = kCellWidth / kCells;

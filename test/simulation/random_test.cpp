@@ -1,6 +1,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -68,21 +69,19 @@ TEST(Random, UniformFillsItsRange) {
   EXPECT_NEAR(sum / 100'000, 2.0, 0.04);
 }
 
-TEST(Random, LowerBitsAreIndependentOfTheNormalNumber) {
-  Random random(1004, Stream::kLidar);
-  double sum_when_low = 0.0, squares_when_low = 0.0;
-  int low = 0;
-  for (int i = 0; i < kDraws; ++i) {
-    const std::uint64_t bits = random.bits();
-    if (static_cast<std::uint32_t>(bits) >= 0x20000000u) continue;
-    const double z = random.normalFrom(bits);
-    sum_when_low += z;
-    squares_when_low += z * z;
-    ++low;
+TEST(NormalLevels, HaveTheNormalsMomentsAndOrder) {
+  const std::vector<double> levels = normalLevels(4096);
+  double sum = 0.0, squares = 0.0, fourth = 0.0;
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    sum += levels[i];
+    squares += levels[i] * levels[i];
+    fourth += std::pow(levels[i], 4);
+    ASSERT_TRUE(i == 0 || levels[i] > levels[i - 1]);
   }
-  EXPECT_NEAR(low, kDraws / 8, 4.0 * std::sqrt(kDraws / 8.0));
-  EXPECT_NEAR(sum_when_low / low, 0.0, 4.0 / std::sqrt(low));
-  EXPECT_NEAR(squares_when_low / low, 1.0, 4.0 * std::sqrt(2.0 / low));
+  EXPECT_NEAR(sum / 4096, 0.0, 1e-9);
+  EXPECT_NEAR(squares / 4096, 1.0, 1e-9);
+  EXPECT_NEAR(fourth / 4096, 3.0, 0.02);
+  EXPECT_NEAR(levels[4095 - 93], 2.0, 0.01) << "2.275 % lie beyond two";
 }
 
 TEST(Random, StreamsOfOneSeedAndSeedsOfOneStreamAreUncorrelated) {

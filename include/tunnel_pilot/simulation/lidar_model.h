@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "tunnel_pilot/config/node.h"
@@ -61,6 +63,8 @@ class LidarModel {
   double dropout() const { return dropout_; }  ///< share of beams that dust meets [1]
 
  private:
+  static constexpr int kErrorBits = 12;
+
   void cast(const world::RayCaster& caster, const geometry::Pose& first, const geometry::Pose& last);
   void hideBehindGround(double height, double pitch);
   void addNoiseAndDust();
@@ -71,6 +75,9 @@ class LidarModel {
   Random dust_;
   double bias_;
   double dropout_;
+  /// Equally likely errors of this unit's ranges, bias included [m]. Much finer than the millimetre that
+  /// such a sensor resolves, and several times faster than a normal number for every beam.
+  std::array<float, std::size_t{1} << kErrorBits> errors_;
   double burst_direction_ = 0.0;  ///< [rad]
   Stamp burst_end_;
   geometry::Scan scan_;

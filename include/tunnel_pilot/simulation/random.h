@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <vector>
 
 namespace tunnel_pilot::simulation {
 
@@ -24,6 +25,10 @@ enum class Stream : std::uint64_t {
 
 /// Seed of one stream of one scenario seed (SplitMix64 of both, Steele, Lea & Flood 2014).
 std::uint64_t streamSeed(std::uint64_t seed, Stream stream);
+
+/// `count` equally likely values that stand for the standard normal distribution: its quantiles in the
+/// middles of `count` equal parts, scaled to unit variance. Ascending; mean 0.
+std::vector<double> normalLevels(std::size_t count);
 
 /// Random numbers that are the same on every platform (the standard library's distributions are not):
 /// bits by xoshiro256++ (Blackman & Vigna 2021), normal numbers by linear interpolation in a table of
@@ -50,11 +55,8 @@ class Random {
   double uniform(double min, double max) { return min + (max - min) * uniform(); }
 
   /// Standard normal.
-  double normal() { return normalFrom(bits()); }
-
-  /// Standard normal number from the upper 31 of these bits: the lower 32 stay independent of it, for
-  /// callers in a hurry that need a second draw.
-  double normalFrom(std::uint64_t bits) const {
+  double normal() {
+    const std::uint64_t bits = this->bits();
     const auto cell = static_cast<std::size_t>(bits >> 53) & (kCells - 1);
     double value;
     if (cell != kCells - 1) {
