@@ -296,8 +296,7 @@ class GridScan {
   Directions directions_;
 };
 
-// Largest difference of a peer's ranges from ours over the route, without beams that graze an edge: they
-// may meet either side of it. [m]
+// Median difference of a peer's ranges from ours over the route [m]: whether both do the same work.
 template <typename Scan>
 double medianDifference(const RayCaster& caster, const std::vector<Pose>& poses, Scan scan) {
   std::vector<double> differences;

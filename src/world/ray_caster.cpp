@@ -27,13 +27,15 @@ using geometry::Pose;
 constexpr int kVertices = 16;            // in a chunk, the last one repeated where there are less
 constexpr int kSegments = kVertices - 1;
 constexpr int kLane = 4;                 // beams filled at once
+constexpr std::size_t kGroup = 8;        // chunks culled together
 constexpr int kMaxBeams = 16384;
+constexpr float kSlack = 1e-3F;          // of bounds, for the rounding of float [m]
 constexpr double kAngleError = 5e-6;     // bound on the float angle's error [rad]
 // A beam that meets a line at range r, where the line passes the sensor at distance h, has a rounding error
 // of about 2e-7 r^2 / h: below 0.5 mm where h exceeds this times r^2.
 constexpr float kGrazing = 4e-4F;        // [1/m]
 
-// What encloses a chunk: all points within `thickness` of a line through the middle, half of which is
+// What encloses a chunk or a group of them: all points within `thickness` of a line through the middle, half of which is
 // (along_x, along_y). Walls are long and thin, so this culls far better than a circle.
 struct Bounds {
   double x;  // middle [m]
@@ -44,11 +46,12 @@ struct Bounds {
   float radius;  // of the circle about the middle [m]
 };
 
-// Chains cut into chunks of at most kSegments segments.
+// Chains cut into chunks of at most kSegments segments, and groups of kGroup chunks.
 class ChunkList {
  public:
   void assign(const std::vector<WallChain>& chains) {
     bounds.clear();
+    groups.clear();
     x.clear();
     y.clear();
     for (const WallChain& chain : chains) {
@@ -56,13 +59,30 @@ class ChunkList {
         add(&chain[first], std::min<std::size_t>(kVertices, chain.size() - first));
       }
     }
+    for (std::size_t first = 0; first < bounds.size(); first += kGroup) addGroup(first);
   }
 
   std::vector<Bounds> bounds;  // of the chunks
+  std::vector<Bounds> groups;  // the circles round groups
   std::vector<double> x;  // kVertices a chunk [m]
   std::vector<double> y;
 
  private:
+  void addGroup(std::size_t first) {
+    const std::size_t last = std::min(first + kGroup, bounds.size());
+    Point middle(0.0, 0.0);
+    for (std::size_t i = first; i < last; ++i) {
+      middle += Point(bounds[i].x, bounds[i].y) / static_cast<double>(last - first);
+    }
+    double radius = 0.0;
+    for (std::size_t i = first; i < last; ++i) {
+      const double far = std::hypot(bounds[i].x - middle.x(), bounds[i].y - middle.y());
+      radius = std::max(radius, far + static_cast<double>(bounds[i].radius));
+    }
+    const float circle = static_cast<float>(radius) + kSlack;
+    groups.push_back({middle.x(), middle.y(), 0.0F, 0.0F, circle, circle});
+  }
+
   void add(const Point* vertices, std::size_t count) {
     Point along = vertices[count - 1] - vertices[0];
     along = along.norm() > 0.0 ? along.normalized() : Point(1.0, 0.0);
@@ -77,10 +97,9 @@ class ChunkList {
     }
     const Point middle = 0.5 * (low.x() + high.x()) * along + 0.5 * (low.y() + high.y()) * across;
     const Point half = 0.5 * (high - low);
-    const float slack = 1e-3F;  // for the rounding of float [m]
     bounds.push_back({middle.x(), middle.y(), static_cast<float>(half.x() * along.x()),
-                      static_cast<float>(half.x() * along.y()), static_cast<float>(half.y()) + slack,
-                      static_cast<float>(half.norm()) + slack});
+                      static_cast<float>(half.x() * along.y()), static_cast<float>(half.y()) + kSlack,
+                      static_cast<float>(half.norm()) + kSlack});
     for (std::size_t i = 0; i < kVertices; ++i) {
       x.push_back(vertices[std::min(i, count - 1)].x());
       y.push_back(vertices[std::min(i, count - 1)].y());
@@ -98,6 +117,21 @@ struct View {
   bool wide;                      // the beams span more than half a turn
   float range_max;                // [m]
   float* inverse;                 // 1 / range by beam [1/m]
+
+  // False when what is enclosed lies out of range or beside all beams.
+  bool mayMeet(const Bounds& b) const {
+    const auto dx = static_cast<float>(b.x - x);
+    const auto dy = static_cast<float>(b.y - y);
+    const float reach = range_max + b.radius;
+    if (dx * dx + dy * dy > reach * reach) return false;
+    const auto partlyLeftOf = [&](float ray_x, float ray_y) {
+      const float half = std::abs(ray_x * b.along_y - ray_y * b.along_x);
+      return ray_x * dy - ray_y * dx + half + b.thickness >= 0.0F;
+    };
+    const bool left_of_first = partlyLeftOf(right.x(), right.y());
+    const bool right_of_last = partlyLeftOf(-left.x(), -left.y());
+    return wide ? left_of_first || right_of_last : left_of_first && right_of_last;
+  }
 };
 
 // What the vertices and segments of a chunk are in the sensor's frame, whose x axis is the middle beam.
@@ -192,20 +226,12 @@ View RayCaster::Impl::view(const Pose& sensor, int first, int last, float* inver
 }
 
 void RayCaster::Impl::castList(const ChunkList& list, const View& view) const {
-  for (std::size_t i = 0; i < list.bounds.size(); ++i) {
-    const Bounds& b = list.bounds[i];
-    const auto dx = static_cast<float>(b.x - view.x);
-    const auto dy = static_cast<float>(b.y - view.y);
-    const float reach = view.range_max + b.radius;
-    if (dx * dx + dy * dy > reach * reach) continue;
-    // True when some of the chunk lies to the left of a ray in this direction.
-    const auto leftOf = [&](float x, float y) {
-      return x * dy - y * dx + std::abs(x * b.along_y - y * b.along_x) + b.thickness >= 0.0F;
-    };
-    const bool left_of_first = leftOf(view.right.x(), view.right.y());
-    const bool right_of_last = leftOf(-view.left.x(), -view.left.y());
-    if (view.wide ? !(left_of_first || right_of_last) : !(left_of_first && right_of_last)) continue;
-    castChunk(&list.x[i * kVertices], &list.y[i * kVertices], view);
+  for (std::size_t group = 0; group < list.groups.size(); ++group) {
+    if (!view.mayMeet(list.groups[group])) continue;
+    const std::size_t last = std::min((group + 1) * kGroup, list.bounds.size());
+    for (std::size_t i = group * kGroup; i < last; ++i) {
+      if (view.mayMeet(list.bounds[i])) castChunk(&list.x[i * kVertices], &list.y[i * kVertices], view);
+    }
   }
 }
 
