@@ -4,11 +4,10 @@
 #include <cstdio>
 #include <ctime>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
-
-#include <nlohmann/json.hpp>
 
 namespace tunnel_pilot::benchmark {
 namespace {
@@ -102,7 +101,8 @@ void Contest::tell(const std::string& peer, const std::string& ours) {
   rows_.push_back({peer, "us", median(peer), median(ours), median(peer) / median(ours), "", true});
 }
 
-void Contest::requireAtMost(const std::string& what, const std::string& unit, double ours, double limit) {
+void Contest::requireAtMost(const std::string& what, const std::string& unit, double ours,
+                            double limit) {
   rows_.push_back({what, unit, limit, ours, limit / ours, "at most " + text(limit), ours <= limit});
 }
 
@@ -120,16 +120,23 @@ int Contest::finish() const {
   bool all_met = true;
   for (const Row& row : rows_) {
     all_met = all_met && row.met;
-    rows.push_back({{"what", row.what}, {"unit", row.unit}, {"peer", row.peer}, {"ours", row.ours},
-                    {"ratio", row.ratio}, {"goal", row.goal}, {"met", row.met}});
-    std::printf("%-14s %-42s %10.4g %10.4g %-6s %8.3g  %s%s\n", work_.c_str(), row.what.c_str(), row.peer,
-                row.ours, row.unit.c_str(), row.ratio, row.goal.c_str(), row.met ? "" : "  NOT MET");
+    rows.push_back({{"what", row.what},
+                    {"unit", row.unit},
+                    {"peer", row.peer},
+                    {"ours", row.ours},
+                    {"ratio", row.ratio},
+                    {"goal", row.goal},
+                    {"met", row.met}});
+    std::printf("%-14s %-42s %10.4g %10.4g %-6s %8.3g  %s%s\n", work_.c_str(), row.what.c_str(),
+                row.peer, row.ours, row.unit.c_str(), row.ratio, row.goal.c_str(),
+                row.met ? "" : "  NOT MET");
   }
   for (const std::string& peer : missing_) {
     std::printf("%-14s %-42s not installed\n", work_.c_str(), peer.c_str());
   }
   nlohmann::json counted = nlohmann::json::array();
-  for (const auto& [name, limit] : counted_limits_) counted.push_back({{"name", name}, {"limit", limit}});
+  for (const auto& [name, limit] : counted_limits_)
+    counted.push_back({{"name", name}, {"limit", limit}});
   if (!json_file_.empty()) {
     std::ofstream file(json_file_);
     file << nlohmann::json{{"work", work_}, {"rows", rows}, {"missing", missing_}, {"counted", counted}}

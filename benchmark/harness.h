@@ -10,12 +10,12 @@ namespace tunnel_pilot::benchmark {
 
 /// A goal for one of our figures, as one row of the table.
 struct Row {
-  std::string what;      ///< the peer, or the figure that is judged
-  std::string unit;      ///< of `peer` and `ours`
-  double peer = 0.0;     ///< the peer's figure, or the limit
+  std::string what;   ///< the peer, or the figure that is judged
+  std::string unit;   ///< of `peer` and `ours`
+  double peer = 0.0;  ///< the peer's figure, or the limit
   double ours = 0.0;
-  double ratio = 0.0;    ///< peer / ours
-  std::string goal;      ///< in words
+  double ratio = 0.0;  ///< peer / ours
+  std::string goal;    ///< in words
   bool met = false;
 };
 
@@ -52,8 +52,8 @@ class Contest {
   void requireAtMost(const std::string& what, const std::string& unit, double ours, double limit);
   /// ... or must reach it.
   void requireAtLeast(const std::string& what, const std::string& unit, double ours, double limit);
-  /// The work called `name` must not take more than `limit` instructions. They are counted afterwards, by
-  /// scripts/benchmark with valgrind, from two runs of this program with --count.
+  /// The work called `name` must not take more than `limit` instructions. They are counted afterwards,
+  /// by scripts/benchmark with valgrind, from two runs of this program with --count.
   void requireInstructions(const std::string& name, double limit);
   /// A peer's figure without a goal.
   void tell(const std::string& peer, const std::string& ours);

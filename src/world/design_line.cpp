@@ -13,15 +13,15 @@ namespace {
 using config::Node;
 using geometry::PathPiece;
 
-constexpr double kMaxLength = 2000.0;         // of one piece [m]
-constexpr double kMinRadius = 3.0;            // [m]
-constexpr double kMaxRadius = 10000.0;        // [m]
-constexpr double kMaxAngle = 2.0 * M_PI;      // of one arc [rad]
-constexpr double kClosureTolerance = 0.01;    // [m]
-constexpr double kHeadingTolerance = 1e-3;    // [rad]
-constexpr double kMinSolvedLength = 0.5;      // [m]
-constexpr double kProvisionalLength = 1.0;    // of a straight still to be solved [m]
-constexpr double kSpacingOfClosure = 1.0;     // the quadrature is exact enough at any spacing [m]
+constexpr double kMaxLength = 2000.0;       // of one piece [m]
+constexpr double kMinRadius = 3.0;          // [m]
+constexpr double kMaxRadius = 10000.0;      // [m]
+constexpr double kMaxAngle = 2.0 * M_PI;    // of one arc [rad]
+constexpr double kClosureTolerance = 0.01;  // [m]
+constexpr double kHeadingTolerance = 1e-3;  // [rad]
+constexpr double kMinSolvedLength = 0.5;    // [m]
+constexpr double kProvisionalLength = 1.0;  // of a straight still to be solved [m]
+constexpr double kSpacingOfClosure = 1.0;   // the quadrature is exact enough at any spacing [m]
 const char* const kKey = "design_line";
 
 enum class Kind { kStraight, kArc, kClothoid };
@@ -140,7 +140,8 @@ void closeHeading(const Node& world, std::vector<Piece>& pieces) {
   const double turn = turnOf(joined(world, pieces, true), pieces.size());
   if (!free_arc) {
     if (std::abs(std::abs(turn) - 2.0 * M_PI) <= kHeadingTolerance) return;
-    world.refuse(kKey, "turns by " + format(turn) + " rad in all, a closed line by 6.28319 rad; leave out " +
+    world.refuse(kKey, "turns by " + format(turn) +
+                           " rad in all, a closed line by 6.28319 rad; leave out " +
                            "the angle of one arc or bend to have it solved");
   }
   const double side = free_arc->curvature > 0.0 ? 1.0 : -1.0;
@@ -189,7 +190,8 @@ void closePosition(const Node& world, std::vector<Piece>& pieces) {
 void checkClosure(const Node& world, const std::vector<PathPiece>& path) {
   const double gap = geometry::closureGap(geometry::buildPath(path, {}, kSpacingOfClosure));
   if (gap <= kClosureTolerance) return;
-  world.refuse(kKey, "ends " + format(gap) + " m from its start, a closed line within 0.01 m; leave out " +
+  world.refuse(kKey, "ends " + format(gap) +
+                         " m from its start, a closed line within 0.01 m; leave out " +
                          "the length of two straights to have them solved");
 }
 
@@ -203,7 +205,7 @@ std::vector<PathPiece> readDesignLine(Node& world, bool closed) {
     closeHeading(world, pieces);
     closePosition(world, pieces);
   }
-  const std::vector<PathPiece> path = withLength(joined(world, pieces, closed));
+  std::vector<PathPiece> path = withLength(joined(world, pieces, closed));
   if (closed) checkClosure(world, path);
   return path;
 }

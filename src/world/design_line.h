@@ -13,8 +13,8 @@ namespace tunnel_pilot::world {
 ///   clothoid: {length [m]}              from the curvature of the piece before to that of the next
 ///   bend:     {radius [m], angle [rad], turn: left | right, transition [m]}
 ///                                       clothoid, arc, clothoid that turn by `angle` in all
-/// On a closed line two straights may have no length and one arc or bend no angle: they are solved so that
-/// the line closes. Throws ConfigError; also when a closed line misses its start.
+/// On a closed line two straights may have no length and one arc or bend no angle: they are solved so
+/// that the line closes. Throws ConfigError; also when a closed line misses its start.
 std::vector<geometry::PathPiece> readDesignLine(config::Node& world, bool closed);
 
 }  // namespace tunnel_pilot::world

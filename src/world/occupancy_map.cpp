@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <filesystem>
-
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -79,8 +78,10 @@ std::vector<cv::Point2d> outlineOf(const std::vector<cv::Point>& contour) {
   std::vector<cv::Point2d> outline(corners.begin(), corners.end());
   if (outline.size() > 1) return outline;
   const cv::Point2d cell = outline.front();
-  return {{cell.x - 0.5, cell.y - 0.5}, {cell.x + 0.5, cell.y - 0.5},
-          {cell.x + 0.5, cell.y + 0.5}, {cell.x - 0.5, cell.y + 0.5}};
+  return {{cell.x - 0.5, cell.y - 0.5},
+          {cell.x + 0.5, cell.y - 0.5},
+          {cell.x + 0.5, cell.y + 0.5},
+          {cell.x - 0.5, cell.y + 0.5}};
 }
 
 }  // namespace
@@ -95,8 +96,8 @@ std::vector<WallChain> loadOccupancyMap(const std::string& file) {
   for (const std::vector<cv::Point>& contour : contours) {
     WallChain chain;
     for (const cv::Point2d& cell : outlineOf(contour)) {
-      chain.push_back(header.origin.transform({(cell.x + 0.5) * header.resolution,
-                                               (image.rows - 0.5 - cell.y) * header.resolution}));
+      chain.push_back(header.origin.transform(
+          {(cell.x + 0.5) * header.resolution, (image.rows - 0.5 - cell.y) * header.resolution}));
     }
     chain.push_back(chain.front());
     walls.push_back(std::move(chain));

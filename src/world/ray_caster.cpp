@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-// Each wall segment is visited once, instead of each beam: it covers an interval of beams, found from its
-// two end points' angles, and in that interval the inverse range is c A + s B for a beam of direction
-// (c, s). Consecutive segments share the angle of their common vertex, so no beam slips between them. The
-// loops over a chunk's vertices have fixed lengths and no branches, so that the compiler makes vector
-// instructions of them.
+// Each wall segment is visited once, instead of each beam: it covers an interval of beams, found from
+// its two end points' angles, and in that interval the inverse range is c A + s B for a beam of
+// direction (c, s). Consecutive segments share the angle of their common vertex, so no beam slips
+// between them. The loops over a chunk's vertices have fixed lengths and no branches, so that the
+// compiler makes vector instructions of them.
 //
 // Float is used where its rounding stays far below 2 mm, and double where it would not: for the pose's
 // subtraction, for vertices within rounding of a beam, and for segments seen nearly edge-on.
@@ -24,19 +24,19 @@ namespace {
 using geometry::Point;
 using geometry::Pose;
 
-constexpr int kVertices = 16;            // in a chunk, the last one repeated where there are less
+constexpr int kVertices = 16;  // in a chunk, the last one repeated where there are less
 constexpr int kSegments = kVertices - 1;
-constexpr int kLane = 4;                 // beams filled at once
-constexpr std::size_t kGroup = 8;        // chunks culled together
+constexpr int kLane = 4;           // beams filled at once
+constexpr std::size_t kGroup = 8;  // chunks culled together
 constexpr int kMaxBeams = 16384;
-constexpr float kSlack = 1e-3F;          // of bounds, for the rounding of float [m]
-constexpr double kAngleError = 5e-6;     // bound on the float angle's error [rad]
-// A beam that meets a line at range r, where the line passes the sensor at distance h, has a rounding error
-// of about 2e-7 r^2 / h: below 0.5 mm where h exceeds this times r^2.
-constexpr float kGrazing = 4e-4F;        // [1/m]
+constexpr float kSlack = 1e-3F;       // of bounds, for the rounding of float [m]
+constexpr double kAngleError = 5e-6;  // bound on the float angle's error [rad]
+// A beam that meets a line at range r, where the line passes the sensor at distance h, has a rounding
+// error of about 2e-7 r^2 / h: below 0.5 mm where h exceeds this times r^2.
+constexpr float kGrazing = 4e-4F;  // [1/m]
 
-// What encloses a chunk or a group of them: all points within `thickness` of a line through the middle, half of which is
-// (along_x, along_y). Walls are long and thin, so this culls far better than a circle.
+// What encloses a chunk or a group of them: all points within `thickness` of a line through the middle,
+// half of which is (along_x, along_y). Walls are long and thin, so this culls far better than a circle.
 struct Bounds {
   double x;  // middle [m]
   double y;
@@ -64,7 +64,7 @@ class ChunkList {
 
   std::vector<Bounds> bounds;  // of the chunks
   std::vector<Bounds> groups;  // the circles round groups
-  std::vector<double> x;  // kVertices a chunk [m]
+  std::vector<double> x;       // kVertices a chunk [m]
   std::vector<double> y;
 
  private:
@@ -109,14 +109,14 @@ class ChunkList {
 
 // The beams [first, last) of one scan: where they start, where they look, what they have met so far.
 struct View {
-  double x, y;                    // sensor [m]
-  double cosine, sine;            // of the middle direction of all beams, in the map
+  double x, y;          // sensor [m]
+  double cosine, sine;  // of the middle direction of all beams, in the map
   int first, last;
-  Eigen::Vector2f right;          // direction of the first beam, in the map
-  Eigen::Vector2f left;           // direction of the last beam, in the map
-  bool wide;                      // the beams span more than half a turn
-  float range_max;                // [m]
-  float* inverse;                 // 1 / range by beam [1/m]
+  Eigen::Vector2f right;  // direction of the first beam, in the map
+  Eigen::Vector2f left;   // direction of the last beam, in the map
+  bool wide;              // the beams span more than half a turn
+  float range_max;        // [m]
+  float* inverse;         // 1 / range by beam [1/m]
 
   // False when what is enclosed lies out of range or beside all beams.
   bool mayMeet(const Bounds& b) const {
@@ -134,6 +134,11 @@ struct View {
   }
 };
 
+// Kinds of segments, numbers because they are told apart in vector loops.
+constexpr int kPlain = 0;
+constexpr int kEdgeOn = 1;  // nearly in line with the beams
+constexpr int kBehind = 2;  // passes behind the sensor, where the places begin and end
+
 // What the vertices and segments of a chunk are in the sensor's frame, whose x axis is the middle beam.
 struct Projected {
   // One more vertex, the last one again, so that there are as many segments as vertices.
@@ -144,7 +149,7 @@ struct Projected {
   alignas(32) float b[kVertices];
   alignas(32) int from[kVertices];
   alignas(32) int to[kVertices];
-  alignas(32) int special[kVertices];  // 1: nearly edge-on; 2: passes behind the sensor
+  alignas(32) int kind[kVertices];  // one of the following
 };
 
 // atan on [0, 1], error below 2e-6.
@@ -159,11 +164,11 @@ inline float atanUnit(float t) {
 
 struct RayCaster::Impl {
   Beams beams{};
-  double middle = 0.0;       // angle of the middle of all beams [rad]
-  double middle_beam = 0.0;  // its place among the beams
-  double per_radian = 0.0;   // beams a radian
-  float window = 0.0F;       // a vertex nearer to a beam is placed in double [beams]
-  std::vector<float> cosine;  // of the beams from the middle; padded by a lane
+  double middle = 0.0;        // angle of the middle of all beams [rad]
+  double middle_beam = 0.0;   // its place among the beams
+  double per_radian = 0.0;    // beams a radian
+  float window = 0.0F;        // a vertex nearer to a beam is placed in double [beams]
+  std::vector<float> cosine;  // of the beams, from the middle
   std::vector<float> sine;
   std::vector<double> exact_cosine;
   std::vector<double> exact_sine;
@@ -187,7 +192,8 @@ RayCaster::Impl::Impl(const Beams& wanted) : beams(wanted) {
       !(wanted.angle_increment > 0.0) || !(span <= 2.0 * M_PI + 1e-6) ||
       !(wanted.range_max > 0.0 && wanted.range_max <= 1e4)) {
     throw std::invalid_argument(
-        "beams need a count of 1 to 16384, a finite angle_min [rad], a positive angle_increment [rad] that "
+        "beams need a count of 1 to 16384, a finite angle_min [rad], a positive angle_increment [rad] "
+        "that "
         "spans at most a full turn, and a range_max [m] in (0, 10000]");
   }
   middle_beam = 0.5 * (wanted.count - 1);
@@ -195,7 +201,7 @@ RayCaster::Impl::Impl(const Beams& wanted) : beams(wanted) {
   per_radian = 1.0 / wanted.angle_increment;
   window = static_cast<float>(kAngleError * per_radian) +
            4.0F * std::numeric_limits<float>::epsilon() * static_cast<float>(M_PI * per_radian);
-  for (int i = 0; i < wanted.count + kLane; ++i) {
+  for (int i = 0; i < wanted.count; ++i) {
     const double angle = (i - middle_beam) * wanted.angle_increment;
     exact_cosine.push_back(std::cos(angle));
     exact_sine.push_back(std::sin(angle));
@@ -274,7 +280,8 @@ void RayCaster::Impl::placeExactly(const double* x, const double* y, const View&
     if (std::abs(p.u[i] - nearest) >= window) continue;
     const double dx = x[i] - view.x;
     const double dy = y[i] - view.y;
-    const double angle = std::atan2(view.cosine * dy - view.sine * dx, view.cosine * dx + view.sine * dy);
+    const double angle =
+        std::atan2(view.cosine * dy - view.sine * dx, view.cosine * dx + view.sine * dy);
     const double beyond = angle * per_radian + middle_beam - static_cast<double>(nearest);
     p.u[i] = beyond == 0.0 ? nearest : nearest + std::copysign(window, static_cast<float>(beyond));
   }
@@ -305,8 +312,8 @@ void RayCaster::Impl::makeSegments(const View& view, Projected& p) const {
     const int whole_to = static_cast<int>(to);
     p.from[i] = whole_from + (static_cast<float>(whole_from) < from ? 1 : 0);
     p.to[i] = whole_to - (static_cast<float>(whole_to) > to ? 1 : 0);
-    const int grazing = cross * cross < (dx * dx + dy * dy) * (limit * limit) ? 1 : 0;
-    p.special[i] = high - low > half_turn ? 2 : grazing;
+    const int grazing = cross * cross < (dx * dx + dy * dy) * (limit * limit) ? kEdgeOn : kPlain;
+    p.kind[i] = high - low > half_turn ? kBehind : grazing;
   }
 }
 
@@ -353,9 +360,9 @@ void RayCaster::Impl::castChunk(const double* x, const double* y, const View& vi
   placeExactly(x, y, view, p);
   makeSegments(view, p);
   for (int i = 0; i < kSegments; ++i) {
-    if (p.special[i] == 0) {
+    if (p.kind[i] == kPlain) {
       fill(p.a[i], p.b[i], p.from[i], p.to[i], view.inverse);
-    } else if (p.special[i] == 1) {
+    } else if (p.kind[i] == kEdgeOn) {
       fillExactly(x + i, y + i, view, p.from[i], p.to[i]);
     } else {  // from the greater place to the last beam, and from the first beam to the lesser place
       const float low = std::min(p.u[i], p.u[i + 1]);
@@ -384,7 +391,7 @@ void RayCaster::cast(const Pose& sensor, float* ranges, int first, int last) con
                                 ") are not of this scan");
   }
   if (first == last) return;
-  alignas(32) std::array<float, kMaxBeams + kLane> inverse;
+  alignas(32) std::array<float, kMaxBeams> inverse;
   std::fill(&inverse[static_cast<std::size_t>(first)], &inverse[static_cast<std::size_t>(last)], 0.0F);
   const View view = impl_->view(sensor, first, last, inverse.data());
   impl_->castList(impl_->walls, view);

@@ -13,7 +13,8 @@ double Draws::uniform(double min, double max) {
   return min + (max - min) * unit;
 }
 
-// Box and Muller (1958); the second number of the pair is not kept, so that draws do not depend on history.
+// Box and Muller (1958); the second number of the pair is not kept, so that draws do not depend on
+// history.
 double Draws::gaussian() {
   const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform(0.0, 1.0)));
   return radius * std::cos(uniform(0.0, 2.0 * M_PI));

@@ -11,7 +11,7 @@ using geometry::Path;
 using geometry::PathPoint;
 using geometry::Point;
 
-constexpr double kFoldLimit = 0.9;       // curvature times wall offset; at 1 the inner wall would be a point
+constexpr double kFoldLimit = 0.9;  // curvature times wall offset; at 1 the inner wall would be a point
 constexpr double kCornerSmoothing = 1.0;  // roughness fades out towards an opening's corners [m]
 
 Point normalOf(const PathPoint& p) { return {-std::sin(p.heading), std::cos(p.heading)}; }
@@ -78,8 +78,8 @@ class WallBuilder {
       for (; next != openings.end() && s_[i] >= next->at - 0.5 * next->width; ++next) {
         addOpening(*next, side, draws, chain);
       }
-      const bool inside = next != openings.begin() &&
-                          s_[i] <= std::prev(next)->at + 0.5 * std::prev(next)->width;
+      const bool inside =
+          next != openings.begin() && s_[i] <= std::prev(next)->at + 0.5 * std::prev(next)->width;
       if (inside) continue;
       const PathPoint& p = line_.points()[i];
       chain.add(positionOf(p) + side * (halfWidth(p.s) + rough[i]) * normalOf(p), p.s);
@@ -106,8 +106,8 @@ class WallBuilder {
     const std::vector<double> rough = roughnessAlong(way, perimeter, false, plan_.roughness, draws);
     for (std::size_t i = 0; i < way.size(); ++i) {
       const double u = way[i];
-      const double corner = std::min({u, std::abs(u - o.depth), std::abs(u - o.depth - o.width),
-                                      perimeter - u});
+      const double corner =
+          std::min({u, std::abs(u - o.depth), std::abs(u - o.depth - o.width), perimeter - u});
       const double offset = rough[i] * std::min(1.0, corner / kCornerSmoothing);
       Point p = mouth;
       if (u <= o.depth) {
@@ -147,8 +147,8 @@ class WallBuilder {
         if (plan_.closed) gap = std::min(gap, line_.length() - gap);
         if (gap <= neighbourhood) continue;
         std::ostringstream out;
-        out << "brings the walls at s = " << all.s[k] << " m and s = " << all.s[i] << " m within " << apart
-            << " m of each other";
+        out << "brings the walls at s = " << all.s[k] << " m and s = " << all.s[i] << " m within "
+            << apart << " m of each other";
         return out.str();
       }
     }

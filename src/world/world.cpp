@@ -18,10 +18,10 @@ using geometry::PathPoint;
 using geometry::Point;
 using geometry::Pose;
 
-constexpr double kLineSpacing = 0.25;       // of the design line's samples [m]
-constexpr double kTunnelSeparation = 0.5;   // least rock between parts of a tunnel laid out by hand [m]
-constexpr double kMaxCoordinate = 1e5;      // [m]
-constexpr double kMaxArcLength = 1e5;       // [m]
+constexpr double kLineSpacing = 0.25;      // of the design line's samples [m]
+constexpr double kTunnelSeparation = 0.5;  // least rock between parts of a tunnel laid out by hand [m]
+constexpr double kMaxCoordinate = 1e5;     // [m]
+constexpr double kMaxArcLength = 1e5;      // [m]
 
 Pose readPose(Node node) {
   const Pose pose{node.number("x", "m", -kMaxCoordinate, kMaxCoordinate),
@@ -51,8 +51,9 @@ Obstacle readObstacle(Node node, const Path& line) {
   if (node.has("pose")) {
     obstacle.start = readPose(node.child("pose"));
   } else if (!node.has("beside")) {
-    node.refuse("pose", "is missing: an obstacle has a pose {x, y, heading} or stands beside {s, offset, "
-                        "heading} of the design line");
+    node.refuse("pose",
+                "is missing: an obstacle has a pose {x, y, heading} or stands beside {s, offset, "
+                "heading} of the design line");
   } else if (line.empty()) {
     node.refuse("beside", "needs a world with a design line");
   } else {
@@ -161,7 +162,8 @@ World loadTunnel(Node& node, const WorldOptions& options, bool random) {
   world.design_line = geometry::buildPath(plan.pieces, {}, kLineSpacing, plan.closed);
   world.obstacles = readObstacles(node, world.design_line);
   if (options.reversed) world.design_line = reversedLine(world.design_line);
-  const PathPoint p = world.design_line.at(node.number("start_at", "m", 0.0, world.design_line.length()));
+  const PathPoint p =
+      world.design_line.at(node.number("start_at", "m", 0.0, world.design_line.length()));
   world.start = {p.x, p.y, geometry::wrapAngle(p.heading)};
   return world;
 }
@@ -190,8 +192,7 @@ Path lineThrough(const std::vector<Point>& points, bool closed) {
 }
 
 Path readLinePoints(Node node) {
-  const std::vector<double> xy =
-      node.numbers("points", "m", -kMaxCoordinate, kMaxCoordinate, 4, 100000);
+  const std::vector<double> xy = node.numbers("points", "m", -kMaxCoordinate, kMaxCoordinate, 4, 100000);
   const bool closed = node.boolean("closed");
   node.finish();
   if (xy.size() % 2 != 0) node.refuse("points", "[m] must be pairs x, y");
@@ -200,7 +201,8 @@ Path readLinePoints(Node node) {
   if (closed) points.push_back(points.front());
   for (std::size_t i = 1; i < points.size(); ++i) {
     if ((points[i] - points[i - 1]).norm() < 0.01) {
-      node.refuse("points", "[m] must be at least 0.01 m apart; a closed line does not repeat its first");
+      node.refuse("points",
+                  "[m] must be at least 0.01 m apart; a closed line does not repeat its first");
     }
   }
   return lineThrough(points, closed);
@@ -208,7 +210,8 @@ Path readLinePoints(Node node) {
 
 World loadMap(Node& node, const std::string& file, const WorldOptions& options) {
   World world;
-  world.walls = loadOccupancyMap((std::filesystem::path(file).parent_path() / node.text("map")).string());
+  world.walls =
+      loadOccupancyMap((std::filesystem::path(file).parent_path() / node.text("map")).string());
   world.width = node.number("width", "m", 0.0, 50.0);
   world.start = readPose(node.child("start"));
   if (node.has("design_line")) world.design_line = readLinePoints(node.child("design_line"));
@@ -244,8 +247,8 @@ World loadWorld(const std::string& file, const WorldOptions& options) {
   Node node = config::loadFile(file);
   const std::string type = node.choice("type", {"tunnel", "random_tunnel", "map"});
   const std::string name = node.text("name");
-  World world = type == "map" ? loadMap(node, file, options)
-                              : loadTunnel(node, options, type == "random_tunnel");
+  World world =
+      type == "map" ? loadMap(node, file, options) : loadTunnel(node, options, type == "random_tunnel");
   world.name = name;
   node.finish();
   return world;

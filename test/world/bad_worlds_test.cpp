@@ -1,11 +1,11 @@
 // Every way a world file can be wrong, and what the reader then says.
 
+#include <gtest/gtest.h>
+
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
-
-#include <gtest/gtest.h>
 
 #include "tunnel_pilot/config/node.h"
 #include "tunnel_pilot/world/world.h"
@@ -96,16 +96,19 @@ struct Bad {
 
 const std::vector<Bad> kBad = {
     // What every tunnel has.
-    {kTunnel, "type: tunnel", "type: cave", "'type' = 'cave' must be one of: tunnel, random_tunnel, map"},
+    {kTunnel, "type: tunnel", "type: cave",
+     "'type' = 'cave' must be one of: tunnel, random_tunnel, map"},
     {kTunnel, "type: tunnel\n", "", "'type' is missing"},
     {kTunnel, "name: a tunnel\n", "", "'name' is missing"},
     {kTunnel, "seed: 1", "seed: -1", "'seed' = -1 must be a whole number [1] in [0, 1e+09]"},
     {kTunnel, "width: 5.0", "width: -5.0", "'width' = -5.0 must be a number [m] in [1, 50]"},
     {kTunnel, "width: 5.0", "width: wide", "'width' must be a number [m] in [1, 50]"},
     {kTunnel, "width: 5.0", "width: .nan", "'width' = .nan must be a number [m] in [1, 50]"},
-    {kTunnel, "wall_spacing: 0.5", "wall_spacing: 0", "'wall_spacing' = 0 must be a number [m] in [0.05, 5]"},
+    {kTunnel, "wall_spacing: 0.5", "wall_spacing: 0",
+     "'wall_spacing' = 0 must be a number [m] in [0.05, 5]"},
     {kTunnel, "closed: false", "closed: perhaps", "'closed' must be true or false"},
-    {kTunnel, "start_at: 10.0", "start_at: 1000.0", "'start_at' = 1000.0 must be a number [m] in [0, 152.5]"},
+    {kTunnel, "start_at: 10.0", "start_at: 1000.0",
+     "'start_at' = 1000.0 must be a number [m] in [0, 152.5]"},
     {kTunnel, "sigma: 0.05", "sigma: 5", "'roughness.sigma' = 5 must be a number [m] in [0, 0.5]"},
     {kTunnel, ", correlation_length: 2.0", "", "'roughness.correlation_length' is missing"},
     {kTunnel, "roughness: {sigma: 0.05, correlation_length: 2.0}", "roughness: 3",
@@ -138,15 +141,18 @@ const std::vector<Bad> kBad = {
      "'design_line' has 1 straights without a length; two are needed"},
     {kLoop, "  - straight: {length: 30.0}\n  - bend", "  - bend",
      "'design_line' closes only with a straight of"},
-    {kLoop, "straight: {}\n  - bend: {radius: 15.0, angle: 1.5708, turn: left, transition: 10.0}\n"
-            "  - straight: {}",
+    {kLoop,
+     "straight: {}\n  - bend: {radius: 15.0, angle: 1.5708, turn: left, transition: 10.0}\n"
+     "  - straight: {}",
      "straight: {length: 29.0}\n  - bend: {radius: 15.0, angle: 1.5708, turn: left, transition: 10.0}\n"
      "  - straight: {length: 30.0}",
      "'design_line' ends 1"},
-    {kLoop, "straight: {length: 30.0}\n  - bend: {radius: 15.0, angle: 1.5708, turn: left, transition: 10.0}\n"
-            "  - straight: {length: 30.0}",
+    {kLoop,
+     "straight: {length: 30.0}\n  - bend: {radius: 15.0, angle: 1.5708, turn: left, transition: 10.0}\n"
+     "  - straight: {length: 30.0}",
      "straight: {}\n  - bend: {radius: 15.0, angle: 1.5708, turn: left, transition: 10.0}\n"
-     "  - straight: {length: 30.0}", "'design_line' has 3 straights without a length"},
+     "  - straight: {length: 30.0}",
+     "'design_line' has 3 straights without a length"},
     {kLoop, "angle: 1.5708, turn: left, transition: 10.0}\n  - straight: {length: 30.0}",
      "turn: left, transition: 10.0}\n  - bend: {radius: 9.0, turn: left, transition: 2.0}",
      "'design_line' may leave out the angle of one arc or bend only"},
@@ -166,7 +172,8 @@ const std::vector<Bad> kBad = {
     {kTunnel, "    pose: {x: 20.0, y: 0.0, heading: 0.0}\n", "", "'obstacles[0].pose' is missing"},
     {kTunnel, "pose: {x: 20.0, y: 0.0, heading: 0.0}", "beside: {s: 900.0, offset: 0.0, heading: 0.0}",
      "'obstacles[0].beside.s' = 900.0 must be a number [m] in [0, 152.5]"},
-    {kTunnel, "speed: 0.0", "speed: -3.0", "'obstacles[0].speed' = -3.0 must be a number [m/s] in [0, 50]"},
+    {kTunnel, "speed: 0.0", "speed: -3.0",
+     "'obstacles[0].speed' = -3.0 must be a number [m/s] in [0, 50]"},
     // Random layouts.
     {kRandom, "bend_radius: [12.0, 25.0]", "bend_radius: [25.0, 12.0]",
      "'bend_radius' [m] must be [smallest, largest]"},
@@ -176,9 +183,11 @@ const std::vector<Bad> kBad = {
      "'bays.probability' = 1.3 must be a number [1] in [0, 1]"},
     {kRandom, "separation: 3.0\n", "", "'separation' is missing"},
     {kRandom, "separation: 3.0", "separation: 3.0\nclosed: true", "'closed' is unknown"},
-    {kRandom, "separation: 3.0", "separation: 30.0", "'separation' = 30.0 must be a number [m] in [0, 10]"},
+    {kRandom, "separation: 3.0", "separation: 30.0",
+     "'separation' = 30.0 must be a number [m] in [0, 10]"},
     // Turns on the spot, which bring the drift back beside itself whatever is drawn.
-    {kRandom, "[12.0, 25.0]\nbend_angle: [0.4, 1.6]\ntransition_length: [8.0, 12.0]\nreversal_probability: 0.3",
+    {kRandom,
+     "[12.0, 25.0]\nbend_angle: [0.4, 1.6]\ntransition_length: [8.0, 12.0]\nreversal_probability: 0.3",
      "[3.0, 3.0]\nbend_angle: [2.9, 2.9]\ntransition_length: [0.5, 0.5]\nreversal_probability: 0.0",
      "'min_length' [m]: no layout suits in 200 draws; the last one brings the walls at s = "},
 };

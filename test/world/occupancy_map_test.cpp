@@ -1,10 +1,10 @@
+#include <gtest/gtest.h>
+
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
-
-#include <gtest/gtest.h>
 
 #include "tunnel_pilot/config/node.h"
 #include "tunnel_pilot/world/ray_caster.h"
@@ -25,7 +25,8 @@ class MapFiles : public ::testing::Test {
 
   // Cells by letters: '#' occupied, '?' unknown, '.' free.
   void writeImage(const std::vector<std::string>& rows) {
-    std::string text = "P5\n" + std::to_string(rows[0].size()) + " " + std::to_string(rows.size()) + "\n255\n";
+    std::string text =
+        "P5\n" + std::to_string(rows[0].size()) + " " + std::to_string(rows.size()) + "\n255\n";
     for (const std::string& row : rows) {
       for (const char cell : row) {
         text += static_cast<char>(cell == '#' ? 0 : cell == '?' ? 205 : 254);
@@ -36,8 +37,10 @@ class MapFiles : public ::testing::Test {
 
   World load(const std::string& map = kMap, const std::string& more = "", bool reversed = false) {
     write("map.yaml", map);
-    write("world.yaml", "type: map\nname: m\nmap: map.yaml\nwidth: 0.0\n"
-                        "start: {x: 1.0, y: 2.0, heading: 0.5}\n" + more);
+    write("world.yaml",
+          "type: map\nname: m\nmap: map.yaml\nwidth: 0.0\n"
+          "start: {x: 1.0, y: 2.0, heading: 0.5}\n" +
+              more);
     return loadWorld((folder_ / "world.yaml").string(), {std::nullopt, reversed});
   }
 
@@ -165,13 +168,15 @@ TEST_F(MapFiles, BadMapsAreRefusedByFileKeyUnitAndRange) {
   write("broken.pgm", "this is no image");
   write("empty.pgm", "P5\n2 1\n255\n\xfe\xfe");
   const std::vector<BadMap> cases = {
-      {"resolution: 0.5", "resolution: 0.0", "map.yaml: 'resolution' = 0.0 must be a number [m] in [0.001, 10]"},
+      {"resolution: 0.5", "resolution: 0.0",
+       "map.yaml: 'resolution' = 0.0 must be a number [m] in [0.001, 10]"},
       {"resolution: 0.5", "resolution: fine", "'resolution' must be a number [m]"},
       {"resolution: 0.5\n", "", "map.yaml: 'resolution' is missing"},
       {"negate: 0", "negate: 2", "'negate' = 2 must be a whole number [1] in [0, 1]"},
       {"origin: [10.0, 20.0, 0.0]", "origin: [10.0, 20.0]", "'origin' must be a list of 3 to 3 numbers"},
       {"free_thresh: 0.196", "free_thresh: 0.7", "'free_thresh' [1] must be less than occupied_thresh"},
-      {"occupied_thresh: 0.65", "occupied_thresh: 1.5", "'occupied_thresh' = 1.5 must be a number [1] in [0, 1]"},
+      {"occupied_thresh: 0.65", "occupied_thresh: 1.5",
+       "'occupied_thresh' = 1.5 must be a number [1] in [0, 1]"},
       {"negate: 0", "negate: 0\nmode: scale", "'mode' = 'scale' must be one of: trinary"},
       {"negate: 0", "negate: 0\nhue: 3", "map.yaml: 'hue' is unknown"},
       {"image: image.pgm", "image: nowhere.pgm", "nowhere.pgm' is not a file"},

@@ -1,12 +1,12 @@
 #include "tunnel_pilot/world/ray_caster.h"
 
+#include <gtest/gtest.h>
+
 #include <cmath>
 #include <cstdlib>
 #include <limits>
 #include <new>
 #include <random>
-
-#include <gtest/gtest.h>
 
 // Bytes asked of the heap by this program, so that tests can tell what a call takes.
 static std::size_t g_allocated = 0;
@@ -87,7 +87,8 @@ Pose randomPose(std::mt19937& engine) {
   return {place(engine), place(engine), heading(engine)};
 }
 
-const std::vector<WallChain> kRoom = {{{-3.0, -2.0}, {5.0, -2.0}, {5.0, 4.0}, {-3.0, 4.0}, {-3.0, -2.0}}};
+const std::vector<WallChain> kRoom = {
+    {{-3.0, -2.0}, {5.0, -2.0}, {5.0, 4.0}, {-3.0, 4.0}, {-3.0, -2.0}}};
 
 TEST(RayCaster, RoomHasTheRangesOneCanReckon) {
   const RayCaster caster(kRoom, {-90.0 * kDegree, 90.0 * kDegree, 3, 40.0});
@@ -160,7 +161,8 @@ TEST(RayCaster, FarFromTheOriginItIsAsExact) {
   EXPECT_EQ(wrong, 0);
 }
 
-// Polygons whose vertices lie on beams, or beside them by some rounding: where a caster leaks if it leaks.
+// Polygons whose vertices lie on beams, or beside them by some rounding: where a caster leaks if it
+// leaks.
 TEST(RayCaster, ClosedOutlinesLetNoBeamThrough) {
   std::mt19937 engine(10);
   std::uniform_real_distribution<double> radius(2.0, 30.0), tiny(-1e-6, 1e-6);
@@ -175,6 +177,24 @@ TEST(RayCaster, ClosedOutlinesLetNoBeamThrough) {
     std::vector<float> ranges;
     RayCaster({outline}, kScan).cast({0.0, 0.0, 0.0}, ranges);
     for (const float range : ranges) ASSERT_TRUE(range > 1.9F && range < 30.1F) << range;
+  }
+}
+
+// A corner some nanoradians beside a beam: it hides the wall behind it, or it does not.
+TEST(RayCaster, CornersHideNoMoreAndNoLessThanTheyDo) {
+  std::mt19937 engine(13);
+  std::uniform_real_distribution<double> beside(2e-9, 1e-6);
+  std::uniform_int_distribution<int> beams(100, 660);
+  for (int k = 0; k < 1000; ++k) {
+    const int beam = beams(engine);
+    const bool hides = k % 2 == 0;
+    const double angle =
+        kScan.angle_min + beam * kScan.angle_increment + (hides ? 1.0 : -1.0) * beside(engine);
+    const Point corner(3.0 * std::cos(angle), 3.0 * std::sin(angle));
+    const Point end(3.0 * std::cos(angle - 0.2), 3.0 * std::sin(angle - 0.2));
+    std::vector<float> ranges;
+    RayCaster({{corner, end}}, kScan).cast({0.0, 0.0, 0.0}, ranges);
+    ASSERT_EQ(std::isfinite(ranges[static_cast<std::size_t>(beam)]), hides) << k;
   }
 }
 

@@ -1,12 +1,12 @@
 #include "tunnel_pilot/world/world.h"
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-
-#include <gtest/gtest.h>
 
 #include "tunnel_pilot/world/ray_caster.h"
 
@@ -61,9 +61,10 @@ double correlation(const std::vector<double>& x, std::size_t lag) {
 }
 
 TEST(Tunnel, WallsStandHalfTheWidthBesideTheLine) {
-  const World world = loadText(tunnel("  - straight: {length: 30.0}\n"
-                                      "  - bend: {radius: 12.0, angle: 1.2, turn: left, transition: 8.0}\n"
-                                      "  - straight: {length: 30.0}\n"));
+  const World world =
+      loadText(tunnel("  - straight: {length: 30.0}\n"
+                      "  - bend: {radius: 12.0, angle: 1.2, turn: left, transition: 8.0}\n"
+                      "  - straight: {length: 30.0}\n"));
   for (double s = 1.0; s < world.design_line.length() - 1.0; s += 0.7) {
     EXPECT_NEAR(wallsAt(world, s).first, 2.5, 0.01) << s;
     EXPECT_NEAR(wallsAt(world, s).second, 2.5, 0.01) << s;
@@ -71,16 +72,18 @@ TEST(Tunnel, WallsStandHalfTheWidthBesideTheLine) {
 }
 
 TEST(Tunnel, BendTurnsByItsAngleAndClothoidJoinsItsNeighbours) {
-  const World world = loadText(tunnel("  - bend: {radius: 12.0, angle: 1.2, turn: right, transition: 8.0}\n"));
+  const World world =
+      loadText(tunnel("  - bend: {radius: 12.0, angle: 1.2, turn: right, transition: 8.0}\n"));
   EXPECT_NEAR(world.design_line.points().back().heading, -1.2, 1e-9);
   EXPECT_NEAR(world.design_line.at(4.0).curvature, -0.5 / 12.0, 1e-3);
   EXPECT_NEAR(world.design_line.at(8.1).curvature, -1.0 / 12.0, 1e-9);
 }
 
 TEST(Tunnel, ReversalRunsFromOneArcsCurvatureToTheOthers) {
-  const World world = loadText(tunnel("  - arc: {radius: 12.0, angle: 1.0, turn: left}\n"
-                                      "  - clothoid: {length: 14.0}\n"
-                                      "  - arc: {radius: 20.0, angle: 1.0, turn: right}\n"));
+  const World world =
+      loadText(tunnel("  - arc: {radius: 12.0, angle: 1.0, turn: left}\n"
+                      "  - clothoid: {length: 14.0}\n"
+                      "  - arc: {radius: 20.0, angle: 1.0, turn: right}\n"));
   EXPECT_NEAR(world.design_line.at(12.0 + 7.0).curvature, 0.5 * (1.0 / 12.0 - 1.0 / 20.0), 1e-4);
 }
 
@@ -117,8 +120,9 @@ TEST(Tunnel, SeedDecidesTheRoughness) {
 }
 
 TEST(Tunnel, WideningMovesBothWallsAndTapers) {
-  const World world = loadText(tunnel("  - straight: {length: 80.0}\n",
-                                      "widenings:\n  - {from: 20.0, to: 60.0, width: 8.0, taper: 10.0}\n"));
+  const World world =
+      loadText(tunnel("  - straight: {length: 80.0}\n",
+                      "widenings:\n  - {from: 20.0, to: 60.0, width: 8.0, taper: 10.0}\n"));
   EXPECT_NEAR(wallsAt(world, 15.0).first, 2.5, 0.01);
   EXPECT_NEAR(wallsAt(world, 25.0).first, 3.25, 0.05);
   EXPECT_NEAR(wallsAt(world, 40.0).first, 4.0, 0.01);
@@ -127,8 +131,9 @@ TEST(Tunnel, WideningMovesBothWallsAndTapers) {
 }
 
 TEST(Tunnel, OpeningIsOnItsSideAsDeepAndWideAsAsked) {
-  const World world = loadText(tunnel("  - straight: {length: 80.0}\n",
-                                      "openings:\n  - {side: right, at: 40.0, width: 5.0, depth: 25.0}\n"));
+  const World world =
+      loadText(tunnel("  - straight: {length: 80.0}\n",
+                      "openings:\n  - {side: right, at: 40.0, width: 5.0, depth: 25.0}\n"));
   EXPECT_NEAR(wallsAt(world, 40.0).second, 27.5, 0.01);
   EXPECT_NEAR(wallsAt(world, 40.0).first, 2.5, 0.01);
   EXPECT_NEAR(wallsAt(world, 37.7).second, 27.5, 0.01);
@@ -137,15 +142,16 @@ TEST(Tunnel, OpeningIsOnItsSideAsDeepAndWideAsAsked) {
 }
 
 TEST(Tunnel, ClosedLineSolvesTwoLengthsAndAnAngle) {
-  const World world = loadText(tunnel("  - straight: {length: 40.0}\n"
-                                      "  - bend: {radius: 15.0, angle: 1.7, turn: left, transition: 8.0}\n"
-                                      "  - straight: {length: 30.0}\n"
-                                      "  - bend: {radius: 12.0, angle: 1.4, turn: left, transition: 8.0}\n"
-                                      "  - straight: {}\n"
-                                      "  - bend: {radius: 13.0, angle: 1.5, turn: left, transition: 8.0}\n"
-                                      "  - straight: {}\n"
-                                      "  - bend: {radius: 12.0, turn: left, transition: 8.0}\n",
-                                      "", true));
+  const World world =
+      loadText(tunnel("  - straight: {length: 40.0}\n"
+                      "  - bend: {radius: 15.0, angle: 1.7, turn: left, transition: 8.0}\n"
+                      "  - straight: {length: 30.0}\n"
+                      "  - bend: {radius: 12.0, angle: 1.4, turn: left, transition: 8.0}\n"
+                      "  - straight: {}\n"
+                      "  - bend: {radius: 13.0, angle: 1.5, turn: left, transition: 8.0}\n"
+                      "  - straight: {}\n"
+                      "  - bend: {radius: 12.0, turn: left, transition: 8.0}\n",
+                      "", true));
   EXPECT_TRUE(world.design_line.closed());
   EXPECT_LT(geometry::closureGap(world.design_line), 1e-6);
   EXPECT_NEAR(world.design_line.points().back().heading, 2.0 * M_PI, 1e-9);
@@ -199,7 +205,8 @@ TEST(DefaultDrift, CurvatureNeverChangesFasterThanATruckCanSteerAtThreeMetresPer
   const World world = loadWorld(kWorlds + "default_drift.yaml");
   const std::vector<PathPoint>& line = world.design_line.points();
   for (std::size_t i = 0; i + 1 < line.size(); ++i) {
-    const double rate = std::abs(line[i + 1].curvature - line[i].curvature) / (line[i + 1].s - line[i].s);
+    const double rate =
+        std::abs(line[i + 1].curvature - line[i].curvature) / (line[i + 1].s - line[i].s);
     EXPECT_LE(rate, 2.0 / 12.0 / 13.0 + 1e-9) << line[i].s;
   }
 }
@@ -215,7 +222,8 @@ TEST(RandomDrift, LayoutsKeepTheirPromises) {
       EXPECT_LE(std::abs(line[i].curvature), 1.0 / 12.0 + 1e-9);
       left = left || line[i].curvature > 0.04;
       right = right || line[i].curvature < -0.04;
-      const double rate = std::abs(line[i + 1].curvature - line[i].curvature) / (line[i + 1].s - line[i].s);
+      const double rate =
+          std::abs(line[i + 1].curvature - line[i].curvature) / (line[i + 1].s - line[i].s);
       EXPECT_LE(rate, 2.0 / 12.0 / 13.0 + 1e-9);
     }
   }
@@ -246,7 +254,8 @@ TEST(RandomDrift, SeedDecidesTheLayout) {
 TEST(RandomDrift, ReversedStartsAtTheOtherEnd) {
   const World there = loadWorld(kWorlds + "random_drift.yaml", {4, false});
   const World back = loadWorld(kWorlds + "random_drift.yaml", {4, true});
-  EXPECT_NEAR(there.design_line.project(back.start.position()).s, there.design_line.length() - 14.0, 0.01);
+  EXPECT_NEAR(there.design_line.project(back.start.position()).s, there.design_line.length() - 14.0,
+              0.01);
 }
 
 TEST(ShippedWorlds, AllLoadWithTheirStartInTheClear) {
@@ -263,7 +272,8 @@ TEST(ShippedWorlds, AllLoadWithTheirStartInTheClear) {
 }
 
 TEST(Obstacle, MovesThereAndBackAgain) {
-  const Obstacle obstacle{"walker", {{0.0, 0.0}, {1.0, 0.0}, {0.0, 1.0}}, {10.0, 5.0, M_PI / 2.0}, 2.0, 6.0};
+  const Obstacle obstacle{
+      "walker", {{0.0, 0.0}, {1.0, 0.0}, {0.0, 1.0}}, {10.0, 5.0, M_PI / 2.0}, 2.0, 6.0};
   EXPECT_NEAR(obstacle.poseAt(0.0).y, 5.0, 1e-12);
   EXPECT_NEAR(obstacle.poseAt(2.0).y, 9.0, 1e-12);
   EXPECT_NEAR(obstacle.poseAt(4.0).y, 9.0, 1e-12);
@@ -278,7 +288,8 @@ TEST(Obstacle, WithoutTravelNeverTurnsBackAndNeverStartsEarly) {
 }
 
 TEST(Obstacle, ChainIsItsClosedOutlineInTheMap) {
-  const Obstacle obstacle{"box", {{1.0, 0.0}, {0.0, 2.0}, {0.0, 0.0}}, {10.0, 5.0, M_PI / 2.0}, 0.0, 0.0};
+  const Obstacle obstacle{
+      "box", {{1.0, 0.0}, {0.0, 2.0}, {0.0, 0.0}}, {10.0, 5.0, M_PI / 2.0}, 0.0, 0.0};
   const WallChain chain = obstacle.chainAt(3.0);
   ASSERT_EQ(chain.size(), 4U);
   EXPECT_TRUE(chain.front() == chain.back());
@@ -288,9 +299,10 @@ TEST(Obstacle, ChainIsItsClosedOutlineInTheMap) {
 }
 
 TEST(Obstacle, BesideTheLineStandsWhereTheLineSays) {
-  const World world = loadText(tunnel("  - arc: {radius: 20.0, angle: 1.5, turn: left}\n",
-                                      "obstacles:\n  - {name: box, outline: [0, 0, 1, 0, 0, 1], speed: 0, "
-                                      "travel: 0, beside: {s: 15.0, offset: -1.2, heading: 0.3}}\n"));
+  const World world =
+      loadText(tunnel("  - arc: {radius: 20.0, angle: 1.5, turn: left}\n",
+                      "obstacles:\n  - {name: box, outline: [0, 0, 1, 0, 0, 1], speed: 0, "
+                      "travel: 0, beside: {s: 15.0, offset: -1.2, heading: 0.3}}\n"));
   ASSERT_EQ(world.obstacles.size(), 1U);
   const auto at = world.design_line.project(world.obstacles[0].start.position());
   EXPECT_NEAR(at.s, 15.0, 0.01);

@@ -16,7 +16,7 @@ class RayCaster {
     double angle_min;        ///< [rad]
     double angle_increment;  ///< [rad], positive
     int count;
-    double range_max;        ///< [m]
+    double range_max;  ///< [m]
   };
 
   RayCaster(const std::vector<WallChain>& walls, const Beams& beams);
