@@ -45,7 +45,8 @@ struct WorldOptions {
 
 /// Reads a world file: `type: tunnel` (list of straights, arcs, clothoids), `type: random_tunnel`
 /// (a seeded layout drawn from ranges) or `type: map` (a map_server YAML with its image, its occupied
-/// regions' outlines made walls with OpenCV). Throws config::ConfigError naming file, key, unit, range.
+/// regions' outlines made walls with OpenCV). docs/worlds.md has the keys. Throws config::ConfigError
+/// naming file, key, unit, range.
 World loadWorld(const std::string& file, const WorldOptions& options = {});
 
 }  // namespace tunnel_pilot::world
