@@ -24,9 +24,10 @@ void ArticulationProfile::build(const geometry::Path& path, const vehicle::Truck
     const double curvature = (next_heading - heading) / spacing;
     samples_.push_back({s, curvature, articulation});
     const double slope = vehicle::articulationSlope(truck, curvature, articulation);
-    const double half = vehicle::articulationSlope(truck, curvature, articulation + 0.5 * spacing * slope);
-    articulation = std::clamp(articulation + spacing * half, -truck.max_articulation,
-                              truck.max_articulation);
+    const double half =
+        vehicle::articulationSlope(truck, curvature, articulation + 0.5 * spacing * slope);
+    articulation =
+        std::clamp(articulation + spacing * half, -truck.max_articulation, truck.max_articulation);
     heading = next_heading;
   }
 }

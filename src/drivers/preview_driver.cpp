@@ -9,11 +9,11 @@
 namespace tunnel_pilot::drivers {
 namespace {
 
-constexpr double kLongestPause = 0.1;       // [s] a command moves no further than in this time
-constexpr double kPredictionStep = 0.03;    // [s]
-constexpr double kSteady = 0.01;            // [rad] nearer to its command, the articulation stands
-constexpr double kOffsetJump = 0.5;         // [m] beyond, the filter starts anew
-constexpr double kHeadingJump = 0.15;       // [rad]
+constexpr double kLongestPause = 0.1;     // [s] a command moves no further than in this time
+constexpr double kPredictionStep = 0.03;  // [s]
+constexpr double kSteady = 0.01;          // [rad] nearer to its command, the articulation stands
+constexpr double kOffsetJump = 0.5;       // [m] beyond, the filter starts anew
+constexpr double kHeadingJump = 0.15;     // [rad]
 // How fast a reversing command crosses the valve's dead band, in its own movements.
 constexpr double kDeadBandGain = 2.0;
 
@@ -115,8 +115,7 @@ Proposal PreviewDriver::propose(const perception::Tunnel& tunnel, const Motion& 
 
   const Errors errors = filterErrors(tunnel, *scan_pose);
   learnFrom(motion);
-  const double elapsed =
-      last_time_ ? std::clamp(toSeconds(now - *last_time_), 0.0, kLongestPause) : 0.0;
+  const double elapsed = last_time_ ? std::clamp(toSeconds(now - *last_time_), 0.0, kLongestPause) : 0.0;
   const PathState start = predict(tunnel, *scan_pose, errors, *last_motion_, now);
   const double speed = std::max(motion.speed, parameters_.planning_speed);
   const double rate = planner_.plan(start, tunnel.centerline, speed, yaw_.response(), elapsed);
@@ -127,8 +126,8 @@ Proposal PreviewDriver::propose(const perception::Tunnel& tunnel, const Motion& 
   last_time_ = now;
 
   proposal.valid = true;
-  proposal.articulation_angle = std::clamp(given_[newest_].command + play_, -parameters_.max_articulation,
-                                           parameters_.max_articulation);
+  proposal.articulation_angle = std::clamp(given_[newest_].command + play_,
+                                           -parameters_.max_articulation, parameters_.max_articulation);
   proposal.speed = parameters_.speed;
   proposal.confidence = confidence(tunnel.state);
   const geometry::PathPoint ahead = tunnel.centerline.at(errors.s + speed * parameters_.preview_time);
@@ -143,8 +142,9 @@ PreviewDriver::Errors PreviewDriver::filterErrors(const perception::Tunnel& tunn
                 measured.heading_error};
   if (last_scan_pose_ && measured.stamp >= last_scan_) {
     const double elapsed = toSeconds(measured.stamp - last_scan_);
-    const Errors expected = carried(last_errors_, last_scan_pose_->relative(scan_pose),
-                                    measured.curvature, elapsed, last_motion_ ? last_motion_->articulation : 0.0);
+    const Errors expected =
+        carried(last_errors_, last_scan_pose_->relative(scan_pose), measured.curvature, elapsed,
+                last_motion_ ? last_motion_->articulation : 0.0);
     const double offset_change = measured.lateral_offset - expected.offset;
     const double heading_change = geometry::wrapAngle(measured.heading_error - expected.heading);
     if (std::abs(offset_change) < kOffsetJump && std::abs(heading_change) < kHeadingJump) {

@@ -9,9 +9,7 @@ namespace tunnel_pilot::drivers {
 namespace {
 
 // Beyond this the path-error form would divide by zero: the path's centre of curvature is reached.
-double curvatureRoom(double curvature, double offset) {
-  return std::max(0.2, 1.0 - curvature * offset);
-}
+double curvatureRoom(double curvature, double offset) { return std::max(0.2, 1.0 - curvature * offset); }
 
 // A sweep whose corrections do not help even at this share is not followed.
 constexpr double kLeastCorrection = 0.2;
@@ -39,10 +37,12 @@ PathState PreviewPlanner::advance(const PathState& now, double command_rate, dou
       std::clamp(share * (now.command + 0.5 * command_rate * step - now.articulation), -most, most);
   const double middle = now.articulation + 0.5 * turn_of_hinge;
   const double travel = speed * step;
-  const double arm = truck_.geometry.front_axle_to_hinge * std::cos(middle) +
-                     truck_.geometry.rear_axle_to_hinge;
-  const double turn = (believed.gain * travel * std::sin(middle) + truck_.geometry.rear_axle_to_hinge * turn_of_hinge) /
-                          arm + travel * believed.disturbance;
+  const double arm =
+      truck_.geometry.front_axle_to_hinge * std::cos(middle) + truck_.geometry.rear_axle_to_hinge;
+  const double turn =
+      (believed.gain * travel * std::sin(middle) + truck_.geometry.rear_axle_to_hinge * turn_of_hinge) /
+          arm +
+      travel * believed.disturbance;
   const double slip = -truck_.slip_compliance * speed * turn / step +
                       (believed.gain - 1.0) * std::sin(middle) / (1.0 + std::cos(middle));
   const double advance_on_path =
@@ -53,14 +53,13 @@ PathState PreviewPlanner::advance(const PathState& now, double command_rate, dou
   next.offset = now.offset + travel * std::sin(now.heading_error + 0.5 * error_growth + slip);
   next.heading_error = now.heading_error + error_growth;
   next.articulation = now.articulation + turn_of_hinge;
-  next.command = std::clamp(now.command + command_rate * step, -truck_.max_articulation,
-                            truck_.max_articulation);
+  next.command =
+      std::clamp(now.command + command_rate * step, -truck_.max_articulation, truck_.max_articulation);
   return next;
 }
 
 PreviewPlanner::Linear PreviewPlanner::linearise(const PathState& now, double rate, double speed,
-                                                 double curvature,
-                                                 const YawResponse& believed) const {
+                                                 double curvature, const YawResponse& believed) const {
   const double rear = truck_.geometry.rear_axle_to_hinge;
   const double front = truck_.geometry.front_axle_to_hinge;
   // What follows a rate-limited command with a lag keeps to that rate: no clamp to differentiate.
@@ -74,7 +73,8 @@ PreviewPlanner::Linear PreviewPlanner::linearise(const PathState& now, double ra
   const double arm = front * cosine + rear;
   // The turn's derivatives: by the middle articulation, and by the hinge's own turn.
   const double by_middle =
-      (gain_travel * cosine * arm + (gain_travel * sine + rear * turn_of_hinge) * front * sine) / (arm * arm);
+      (gain_travel * cosine * arm + (gain_travel * sine + rear * turn_of_hinge) * front * sine) /
+      (arm * arm);
   const double by_hinge = 0.5 * by_middle + rear / arm;
   const Vector turn(0.0, 0.0, by_middle - by_hinge * share, by_hinge * share);
   const double turn_by_rate = 0.5 * step_ * by_hinge * share;
@@ -110,8 +110,8 @@ double PreviewPlanner::courseOffset(double speed, double curvature, const YawRes
          0.5 * (1.0 - believed.gain) * curvature * wheelbase / believed.gain;
 }
 
-double PreviewPlanner::cost(const PathState& state, double curvature, double speed,
-                            const YawResponse& believed) const {
+double PreviewPlanner::stageCost(const PathState& state, double curvature, double speed,
+                                 const YawResponse& believed) const {
   const double course = state.heading_error - courseOffset(speed, curvature, believed);
   return weights_.offset * state.offset * state.offset + weights_.heading * course * course;
 }
@@ -131,15 +131,15 @@ double PreviewPlanner::roll(const PathState& now, const geometry::Path& path, do
       rates_[k] = std::clamp(nominal_rates_[k] + correction * corrections_[k] + gains_[k].dot(change),
                              -rateLimit(k), rateLimit(k));
     }
-    const double ahead =
-        std::max(least_step, speed * step_ * std::cos(state.heading_error));
+    const double ahead = std::max(least_step, speed * step_ * std::cos(state.heading_error));
     const double next_heading = cursor.headingAt(state.s + ahead);
     curvatures_[k] = (next_heading - heading) / ahead;
     states_[k] = state;
     state = advance(state, rates_[k], speed, curvatures_[k], believed, step_);
     heading = cursor.headingAt(state.s);
     const double factor = k + 1 == kStages ? weights_.terminal : 1.0;
-    sum += factor * cost(state, curvatures_[k], speed, believed) + weights_.rate * rates_[k] * rates_[k];
+    sum += factor * stageCost(state, curvatures_[k], speed, believed) +
+           weights_.rate * rates_[k] * rates_[k];
   }
   states_[kStages] = state;
   return sum;
@@ -165,8 +165,7 @@ void PreviewPlanner::sweep(double speed, const YawResponse& believed) {
     const double bend = weights_.rate + linear.rate.dot(by_rate);
     const Vector mixed = linear.state.transpose() * by_rate;
     const double free_correction = -slope / bend;
-    corrections_[k] =
-        std::clamp(free_correction, -rateLimit(k) - rates_[k], rateLimit(k) - rates_[k]);
+    corrections_[k] = std::clamp(free_correction, -rateLimit(k) - rates_[k], rateLimit(k) - rates_[k]);
     const bool clamped = corrections_[k] != free_correction;
     gains_[k] = clamped ? Vector::Zero().eval() : (-mixed / bend).eval();
 
@@ -189,10 +188,12 @@ double PreviewPlanner::plan(const PathState& now, const geometry::Path& path, do
   sweep(speed, believed);
   nominal_ = states_;
   nominal_rates_ = rates_;
-  double correction = 1.0;
-  while (correction > kLeastCorrection) {
-    if (roll(now, path, speed, believed, correction) <= before) return rates_[0];
-    correction *= 0.5;
+  cost_ = before;
+  for (double correction = 1.0; correction > kLeastCorrection; correction *= 0.5) {
+    const double after = roll(now, path, speed, believed, correction);
+    if (!(after <= before)) continue;
+    cost_ = after;
+    return rates_[0];
   }
   rates_ = nominal_rates_;  // no better plan was found, or something is not finite
   if (!std::isfinite(before)) reset();

@@ -26,8 +26,8 @@ void YawObserver::update(const Motion& motion, double elapsed) {
   covariance_(0, 0) += fresh * parameters_.gain_deviation * parameters_.gain_deviation;
   covariance_(1, 1) += fresh * parameters_.disturbance_deviation * parameters_.disturbance_deviation;
 
-  const double arm = geometry_.front_axle_to_hinge * std::cos(motion.articulation) +
-                     geometry_.rear_axle_to_hinge;
+  const double arm =
+      geometry_.front_axle_to_hinge * std::cos(motion.articulation) + geometry_.rear_axle_to_hinge;
   const double steady = motion.speed * std::sin(motion.articulation) / arm;
   const double turning = geometry_.rear_axle_to_hinge * motion.articulation_rate / arm;
   const Eigen::Vector2d seen(steady, motion.speed);

@@ -22,13 +22,13 @@ bool isPossible(const drivers::Proposal& proposal) {
 
 int gravity(Reason reason) {
   constexpr std::array<Reason, 24> kRising = {
-      Reason::kNotEngaged,      Reason::kStartUp,         Reason::kOperatorRelease,
-      Reason::kLimitsHit,       Reason::kNoSource,        Reason::kSourceStale,
-      Reason::kProposalInvalid, Reason::kTunnelInvalid,   Reason::kClearance,
-      Reason::kObstacle,        Reason::kScanRejected,    Reason::kScanFrozen,
+      Reason::kNotEngaged,      Reason::kStartUp,          Reason::kOperatorRelease,
+      Reason::kLimitsHit,       Reason::kNoSource,         Reason::kSourceStale,
+      Reason::kProposalInvalid, Reason::kTunnelInvalid,    Reason::kClearance,
+      Reason::kObstacle,        Reason::kScanRejected,     Reason::kScanFrozen,
       Reason::kScanStale,       Reason::kSpeedImplausible, Reason::kMotionStale,
-      Reason::kCommandStale,    Reason::kTrackingError,   Reason::kFeedbackCorrupt,
-      Reason::kFeedbackStale,   Reason::kBusFault,        Reason::kTruckFault,
+      Reason::kCommandStale,    Reason::kTrackingError,    Reason::kFeedbackCorrupt,
+      Reason::kFeedbackStale,   Reason::kBusFault,         Reason::kTruckFault,
       Reason::kClockJump,       Reason::kOperatorOverride, Reason::kOperatorStop};
   const auto place = std::find(kRising.begin(), kRising.end(), reason);
   return place == kRising.end() ? 0 : static_cast<int>(place - kRising.begin()) + 1;
@@ -187,8 +187,8 @@ void Arbiter::assessTruck(Stamp now, Findings& findings) const {
   }
 }
 
-// Without a healthy source the truck stops, unless what the sources lack is about to be judged by itself:
-// a late scan or an invalid tunnel, each with its own grace.
+// Without a healthy source the truck stops, unless what the sources lack is about to be judged by
+// itself: a late scan or an invalid tunnel, each with its own grace.
 void Arbiter::assessSources(Stamp now, Findings& findings) const {
   if (bestSource(now)) return;
   const bool scan_late = age(scan_received_, now) > parameters_.scan_degraded_age;
@@ -198,8 +198,12 @@ void Arbiter::assessSources(Stamp now, Findings& findings) const {
   for (const SourceRule& rule : parameters_.sources) {
     if (!rule.steers) continue;
     switch (health(rule, now)) {
-      case Health::kNever: causes.stopFor(Reason::kStartUp); break;
-      case Health::kInvalid: causes.stopFor(Reason::kProposalInvalid); break;
+      case Health::kNever:
+        causes.stopFor(Reason::kStartUp);
+        break;
+      case Health::kInvalid:
+        causes.stopFor(Reason::kProposalInvalid);
+        break;
       case Health::kStale:
         causes.stopFor(Reason::kSourceStale);
         excused = excused || scan_late;
@@ -208,7 +212,8 @@ void Arbiter::assessSources(Stamp now, Findings& findings) const {
         causes.stopFor(Reason::kNoSource);
         excused = excused || tunnel_lost;
         break;
-      case Health::kHealthy: break;
+      case Health::kHealthy:
+        break;
     }
   }
   if (!excused) findings.stopFor(causes.stop);
@@ -277,8 +282,7 @@ Arbiter::Speed Arbiter::chooseSpeed(Stamp now) {
   }
   if (corridor_stamp_) {
     const bool blocked = envelope_.result().free_until != Envelope::End::kSight;
-    take(governor_.stoppingWithin(freeDistance()),
-         blocked ? SpeedLimit::kObstacle : SpeedLimit::kSight);
+    take(governor_.stoppingWithin(freeDistance()), blocked ? SpeedLimit::kObstacle : SpeedLimit::kSight);
   }
   decision_.speed_limit = lowest.value;
   for (const SourceRule& rule : parameters_.sources) {
@@ -317,12 +321,11 @@ void Arbiter::updateCorridor(double commanded, Stamp now) {
   corridor_stamp_ = points_stamp_;
   driven_since_corridor_ = 0.0;
   const Envelope::Result& result = envelope_.result();
-  const double needed = envelope_.stoppingDistance(std::abs(motion.speed)) + parameters_.envelope.reserve;
-  const bool obstructed =
-      result.free_until != Envelope::End::kSight && result.free_distance < needed;
+  const double needed =
+      envelope_.stoppingDistance(std::abs(motion.speed)) + parameters_.envelope.reserve;
+  const bool obstructed = result.free_until != Envelope::End::kSight && result.free_distance < needed;
   obstructed_scans_ = obstructed ? obstructed_scans_ + 1 : 0;
-  obstruction_ =
-      result.free_until == Envelope::End::kWall ? Reason::kClearance : Reason::kObstacle;
+  obstruction_ = result.free_until == Envelope::End::kWall ? Reason::kClearance : Reason::kObstacle;
 }
 
 void Arbiter::tellCorridor() {
@@ -425,9 +428,9 @@ void Arbiter::letOut(const Steering& steering, const Speed& speed, bool stop, St
   command.speed = result.speed;
   command.acceleration = result.acceleration;
   command.stop = stop;
-  command.mode = !obeyed                                       ? Mode::kStandby
+  command.mode = !obeyed                                     ? Mode::kStandby
                  : steering.source == Source::kTeleoperation ? Mode::kTeleoperation
-                                                               : Mode::kAutonomous;
+                                                             : Mode::kAutonomous;
   command.source = steering.source;
   decision_.speed_source = speed.source;
   decision_.limited_by = speed.by;

@@ -60,7 +60,7 @@ CommandLimiter::Result CommandLimiter::limit(const Request& request, double elap
   }
   result.articulation = articulation_;
   result.speed = speed_;
-  result.acceleration = request.stop            ? parameters_.stop_deceleration
+  result.acceleration = request.stop          ? parameters_.stop_deceleration
                         : acceleration_ < 0.0 ? parameters_.max_deceleration
                                               : parameters_.max_acceleration;
   return result;
@@ -76,8 +76,8 @@ double CommandLimiter::limitAngle(const Request& request, double elapsed, Flags&
   const double measured = std::isfinite(request.measured_speed) ? std::abs(request.measured_speed) : 0.0;
   const double speed = std::max(measured, speed_);
   if (speed > 0.0) {
-    const double widest = vehicle::steadyArticulation(
-        geometry_, parameters_.max_lateral_acceleration / (speed * speed));
+    const double widest =
+        vehicle::steadyArticulation(geometry_, parameters_.max_lateral_acceleration / (speed * speed));
     angle = clamped(angle, -widest, widest, fired.lateral_acceleration);
   }
   const double step = parameters_.max_articulation_rate * elapsed;
@@ -103,8 +103,8 @@ double CommandLimiter::limitSpeed(const Request& request, double elapsed, Flags&
                                 parameters_.max_acceleration, fired.acceleration);
   // The jerk limit also bounds the acceleration from which it can still be brought to zero in time.
   const double jerk_step = parameters_.max_jerk * elapsed;
-  const double landing = std::max(jerk_step, std::sqrt(2.0 * parameters_.max_jerk * std::abs(change)) -
-                                                 jerk_step);
+  const double landing =
+      std::max(jerk_step, std::sqrt(2.0 * parameters_.max_jerk * std::abs(change)) - jerk_step);
   acceleration = clamped(acceleration, -landing, landing, fired.jerk);
   acceleration = clamped(acceleration, acceleration_ - jerk_step, acceleration_ + jerk_step, fired.jerk);
   return std::clamp(speed_ + acceleration * elapsed, 0.0, parameters_.max_speed);

@@ -13,10 +13,12 @@ using geometry::Point;
 using geometry::Pose;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kStep = 1.0;            // [m] between stations and between swept poses
-constexpr double kLeastWay = 6.0;        // [m] swept ahead of the front axle at any speed
-constexpr double kMemoryStep = 0.5;      // [m] driven between remembered walls
-constexpr double kSlowest = 0.5;         // [m/s] for the steering's slope over the way
+constexpr double kStep = 1.0;              // [m] between stations and between swept poses
+constexpr double kLeastWay = 6.0;          // [m] swept ahead of the front axle at any speed
+constexpr double kMemoryStep = 0.5;        // [m] driven between remembered walls
+constexpr double kMemoryReach = 12.0;      // [m] from base_link: beyond the tail
+constexpr double kLongestWallPiece = 3.0;  // [m] a longer gap is not bridged
+constexpr double kSlowest = 0.5;           // [m/s] for the steering's slope over the way
 
 Point direction(double heading) { return {std::cos(heading), std::sin(heading)}; }
 Point leftOf(const Point& d) { return {-d.y(), d.x()}; }
@@ -59,9 +61,8 @@ const Envelope::Result& Envelope::update(const Input& input) {
   result_.free_until = End::kSight;
   layTruck(input);
   layWay(input);
-  layWall(input.walls.left, true);
-  layWall(input.walls.right, false);
-  layMemory(input);
+  layWall(input, true);
+  layWall(input, false);
   remember(input);
   limitSight(input);
   compareWalls();
@@ -125,29 +126,33 @@ void Envelope::layWay(const Input& input) {
   for (double beyond = kStep; beyond < geometry_.front_overhang + kStep; beyond += kStep) {
     addStation(last.transform({beyond, 0.0}), last.heading, stations_.back().s + kStep);
   }
-  for (std::size_t i = 0; i < postures.size(); ++i) sweepBodies(front_axle_ + i, postures[i]);
+  for (std::size_t i = 0; i < postures.size(); ++i) sweepBodies(front_axle_ + i, postures[i], i == 0);
 }
 
-void Envelope::sweepBodies(std::size_t station, const Posture& posture) {
-  const double half = 0.5 * geometry_.overall_width;
+// Each outline point's way from posture to posture is a line beside the spine; of the first posture the
+// sides themselves are laid, from point to point.
+void Envelope::sweepBodies(std::size_t station, const Posture& posture, bool first) {
   const Pose rear = vehicle::rearPose(geometry_, posture.front, posture.articulation);
-  const double to_rear = geometry_.front_axle_to_hinge + geometry_.rear_axle_to_hinge;
-  const auto sweep = [&](const Pose& body, double x, double along) {
+  const double half = 0.5 * geometry_.overall_width;
+  const double hinge = geometry_.front_axle_to_hinge;
+  const double rear_hinge = geometry_.rear_axle_to_hinge;
+  const std::array<double, kOutline> along = {
+      geometry_.front_overhang, 0.0, -hinge, rear_hinge, 0.5 * rear_hinge, 0.0,
+      -geometry_.rear_overhang};
+  for (std::size_t i = 0; i < kOutline; ++i) {
+    const bool on_front = i < kFrontOutline;
+    const Pose& body = on_front ? posture.front : rear;
+    const double from_axle = on_front ? along[i] : along[i] - hinge - rear_hinge;
     const auto near = static_cast<std::size_t>(
-        std::max(0.0, static_cast<double>(station) + std::floor(along / kStep)));
-    for (const double side : {half, -half}) {
-      const Beside place = beside(body.transform({x, side}), near);
-      Station& swept = stations_[place.station];
-      swept.left = std::max(swept.left, place.lateral);
-      swept.right = std::min(swept.right, place.lateral);
+        std::max(0.0, static_cast<double>(station) + std::floor(from_axle / kStep)));
+    for (const bool left : {true, false}) {
+      const Beside place = beside(body.transform({along[i], left ? half : -half}), near);
+      Beside& last = outline_[left ? i : kOutline + i];
+      if (!first) layEdge(last, place, left);
+      if (first && i != 0 && i != kFrontOutline)
+        layEdge(outline_[left ? i - 1 : kOutline + i - 1], place, left);
+      last = place;
     }
-  };
-  for (const double x : {geometry_.front_overhang, 0.0, -geometry_.front_axle_to_hinge}) {
-    sweep(posture.front, x, x);
-  }
-  const double hinge = geometry_.rear_axle_to_hinge;
-  for (const double x : {hinge, 0.5 * hinge, 0.0, -geometry_.rear_overhang}) {
-    sweep(rear, x, x - to_rear);
   }
 }
 
@@ -166,34 +171,54 @@ Envelope::Beside Envelope::beside(const Point& point, std::size_t near) const {
   return {i, stations_[i].s + along, lateral};
 }
 
-void Envelope::placeWall(const Beside& place, bool left) {
-  Station& station = stations_[place.station];
-  if (left) {
-    station.wall_left = std::min(station.wall_left, place.lateral);
-  } else {
-    station.wall_right = std::max(station.wall_right, place.lateral);
+// Calls take(station, lateral) for every station between two places, the lateral interpolated.
+template <typename Take>
+void Envelope::between(const Beside& a, const Beside& b, const Take& take) {
+  const Beside& low = a.s <= b.s ? a : b;
+  const Beside& high = a.s <= b.s ? b : a;
+  for (std::size_t i = low.station; i <= high.station; ++i) {
+    Station& station = stations_[i];
+    if (station.s < low.s || station.s > high.s) continue;
+    const double span = high.s - low.s;
+    const double t = span > 0.0 ? (station.s - low.s) / span : 0.0;
+    take(station, low.lateral + t * (high.lateral - low.lateral));
   }
 }
 
-void Envelope::layWall(const perception::Wall& wall, bool left) {
+void Envelope::layEdge(const Beside& a, const Beside& b, bool left) {
+  between(a, b, [left](Station& station, double lateral) {
+    double& edge = left ? station.left : station.right;
+    edge = left ? std::max(edge, lateral) : std::min(edge, lateral);
+  });
+}
+
+void Envelope::layWallPiece(const Beside& a, const Beside& b, bool left) {
+  if (std::abs(b.s - a.s) > kLongestWallPiece) return;
+  between(a, b, [left](Station& station, double lateral) {
+    double& wall = left ? station.wall_left : station.wall_right;
+    wall = left ? std::min(wall, lateral) : std::max(wall, lateral);
+  });
+}
+
+// The walls passed, in the order in which they were remembered, and then the one seen now.
+void Envelope::layWall(const Input& input, bool left) {
+  const perception::Wall& wall = left ? input.walls.left : input.walls.right;
+  std::optional<Beside> last;
+  const auto lay = [&](const Beside& place) {
+    if (last) layWallPiece(*last, place, left);
+    last = place;
+  };
+  const std::size_t oldest = remembered_ - std::min(remembered_, memory_.size());
+  for (std::size_t i = oldest; i < remembered_; ++i) {
+    const Remembered& passed = memory_[i % memory_.size()];
+    if (passed.left != left) continue;
+    const Point point = input.scan_pose.inverseTransform(passed.point);
+    if (point.squaredNorm() < kMemoryReach * kMemoryReach) lay(beside(point, front_axle_));
+  }
   if (!wall.found) return;
-  std::size_t near = front_axle_;
   for (const Point& point : wall.curve) {
-    const Beside place = beside(point, near);
-    near = place.station;
-    wall_end_ = std::max(wall_end_, place.s);
-    if (place.s <= stations_.back().s + kStep) placeWall(place, left);
-  }
-}
-
-void Envelope::layMemory(const Input& input) {
-  const std::size_t known = std::min(remembered_, memory_.size());
-  for (std::size_t i = 0; i < known; ++i) {
-    const Remembered& wall = memory_[i];
-    const Beside place = beside(input.scan_pose.inverseTransform(wall.point), front_axle_);
-    if (place.s > stations_.front().s && place.s < stations_[front_axle_].s + kStep) {
-      placeWall(place, wall.left);
-    }
+    lay(beside(point, last ? last->station : front_axle_));
+    wall_end_ = std::max(wall_end_, last->s);
   }
 }
 
@@ -242,8 +267,8 @@ void Envelope::compareWalls() {
   result_.clearance_right = known(right);
 }
 
-// Returns inside the corridor count as an obstacle when enough of them stand beside each other, thinned to
-// one every smallest_obstacle / (obstacle_points + 1), so that lone dust does not stop the truck.
+// Returns inside the corridor count as an obstacle when enough of them stand beside each other, thinned
+// to one every smallest_obstacle / (obstacle_points + 1), so that lone dust does not stop the truck.
 void Envelope::findObstacles(const std::vector<Point>& points) {
   const double apart = parameters_.smallest_obstacle / (parameters_.obstacle_points + 1);
   const double together = parameters_.smallest_obstacle;
@@ -257,17 +282,22 @@ void Envelope::findObstacles(const std::vector<Point>& points) {
     last = point;
     const Beside place = beside(point, near);
     near = place.station;
-    const Station& station = stations_[place.station];
-    const bool inside = place.s <= stations_.back().s + kStep &&
-                        place.lateral < station.left + parameters_.margin &&
-                        place.lateral > station.right - parameters_.margin;
-    if (!inside) continue;
+    if (!inCorridor(place)) continue;
     const bool joined = (point - last_inside).squaredNorm() < together * together;
     run = joined ? run + 1 : 1;
     run_s = joined ? std::min(run_s, place.s) : place.s;
     last_inside = point;
     if (run >= parameters_.obstacle_points) endFreeSpace(run_s, End::kObstacle);
   }
+}
+
+bool Envelope::inCorridor(const Beside& place) const {
+  const Station& a = stations_[place.station];
+  const Station& b = stations_[std::min(place.station + 1, stations_.size() - 1)];
+  const double t = (place.s - a.s) / kStep;
+  if (t < 0.0 || t > 1.0 || !(a.left >= a.right) || !(b.left >= b.right)) return false;
+  return place.lateral < a.left + t * (b.left - a.left) + parameters_.margin &&
+         place.lateral > a.right + t * (b.right - a.right) - parameters_.margin;
 }
 
 void Envelope::drawCorridor() {

@@ -12,15 +12,24 @@ constexpr double kStraight = 1e-6;  // [1/m], [rad/m]: no limit below
 
 std::string toString(SpeedLimit limit) {
   switch (limit) {
-    case SpeedLimit::kNone: return "none";
-    case SpeedLimit::kDriver: return "driver";
-    case SpeedLimit::kLateralAcceleration: return "lateral_acceleration";
-    case SpeedLimit::kArticulationRate: return "articulation_rate";
-    case SpeedLimit::kSight: return "sight";
-    case SpeedLimit::kObstacle: return "obstacle";
-    case SpeedLimit::kDegraded: return "degraded";
-    case SpeedLimit::kStop: return "stop";
-    case SpeedLimit::kLimiter: return "acceleration";
+    case SpeedLimit::kNone:
+      return "none";
+    case SpeedLimit::kDriver:
+      return "driver";
+    case SpeedLimit::kLateralAcceleration:
+      return "lateral_acceleration";
+    case SpeedLimit::kArticulationRate:
+      return "articulation_rate";
+    case SpeedLimit::kSight:
+      return "sight";
+    case SpeedLimit::kObstacle:
+      return "obstacle";
+    case SpeedLimit::kDegraded:
+      return "degraded";
+    case SpeedLimit::kStop:
+      return "stop";
+    case SpeedLimit::kLimiter:
+      return "acceleration";
   }
   return "unknown";
 }

@@ -14,11 +14,11 @@ namespace tunnel_pilot::drivers {
 
 /// What the driver believes of the truck, and how it weighs errors (config/preview_driver.yaml).
 struct PreviewDriverParameters {
-  double speed;             ///< highest speed asked for [m/s]
-  double max_tunnel_age;    ///< an older tunnel is not driven on [s]
-  double planning_speed;    ///< lowest speed planned with, so that standing trucks may steer [m/s]
-  double preview_time;      ///< of the point shown as preview point [s]
-  double step;              ///< of the plan; the horizon has PreviewPlanner::kStages of them [s]
+  double speed;           ///< highest speed asked for [m/s]
+  double max_tunnel_age;  ///< an older tunnel is not driven on [s]
+  double planning_speed;  ///< lowest speed planned with, so that standing trucks may steer [m/s]
+  double preview_time;    ///< of the point shown as preview point [s]
+  double step;            ///< of the plan; the horizon has PreviewPlanner::kStages of them [s]
   PreviewWeights weights;
   double dead_time;         ///< of the steering [s]
   double transport_delay;   ///< command to steering valve: cycle, bus, controller [s]
@@ -89,11 +89,11 @@ class PreviewDriver {
 
   std::array<Given, 64> given_{};  ///< commands given, a ring
   std::size_t newest_ = 0;
-  std::optional<Stamp> last_time_;    ///< of the last proposal
-  std::optional<Motion> last_motion_;  ///< its articulation freed of the bias
-  double commanded_articulation_ = 0.0; ///< what the commands given should have made of it by now [rad]
-  double bias_ = 0.0;                   ///< of the measured articulation against the commands [rad]
-  double play_ = 0.0;                   ///< added to the command to cross the dead band [rad]
+  std::optional<Stamp> last_time_;       ///< of the last proposal
+  std::optional<Motion> last_motion_;    ///< its articulation freed of the bias
+  double commanded_articulation_ = 0.0;  ///< what the commands given should have made of it by now [rad]
+  double bias_ = 0.0;                    ///< of the measured articulation against the commands [rad]
+  double play_ = 0.0;                    ///< added to the command to cross the dead band [rad]
 
   std::optional<geometry::Pose> last_scan_pose_;  ///< odom
   Stamp last_scan_{};

@@ -1,10 +1,9 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cstddef>
-
-#include <Eigen/Core>
 
 #include "tunnel_pilot/geometry/path.h"
 #include "tunnel_pilot/vehicle/truck_parameters.h"
@@ -24,10 +23,10 @@ struct PathState {
 /// What the driver knows of the truck's answer to steering.
 struct TruckResponse {
   vehicle::TruckGeometry geometry;
-  double lag;              ///< of the articulation behind its command [s]
-  double max_rate;         ///< of articulation and command [rad/s]
-  double max_articulation; ///< highest command [rad]
-  double slip_compliance;  ///< tyre slip angle per lateral acceleration, 1/(g C) [rad s^2/m]
+  double lag;               ///< of the articulation behind its command [s]
+  double max_rate;          ///< of articulation and command [rad/s]
+  double max_articulation;  ///< highest command [rad]
+  double slip_compliance;   ///< tyre slip angle per lateral acceleration, 1/(g C) [rad s^2/m]
 };
 
 /// How the yaw rate was measured to answer, beside what the kinematics say.
@@ -37,69 +36,70 @@ struct YawResponse {
 };
 
 struct PreviewWeights {
-  double offset;    ///< [1/m^2]
-  double heading;   ///< [1/rad^2]
-  double rate;      ///< of the command's rate [s^2/rad^2]
-  double terminal;  ///< factor on offset and heading at the horizon's end [1]
+  double offset;      ///< [1/m^2]
+  double heading;     ///< [1/rad^2]
+  double rate;        ///< of the command's rate [s^2/rad^2]
+  double terminal;    ///< factor on offset and heading at the horizon's end [1]
   double rate_share;  ///< of max_rate that is planned with late in the horizon [1]
 };
 
 /// Optimal preview: finds the command rates w over the horizon that minimise
 ///   sum of  q_y e_y^2 + q_psi (e_psi + beta)^2 + r w^2
-/// along the previewed path, under |w| <= max_rate (later in the horizon less, which leaves room for what
-/// the model does not know), for the truck's exact kinematics
+/// along the previewed path, under |w| <= max_rate (later in the horizon less, which leaves room for
+/// what the model does not know), for the truck's exact kinematics
 ///   theta_dot = (g v sin(gamma) + l_r gamma_dot) / (l_f cos(gamma) + l_r) + v d
 ///   e_psi_dot = theta_dot - v kappa cos(e_psi) / (1 - kappa e_y)
 ///   beta      = -v theta_dot / (g_0 C) + (g - 1) tan(gamma / 2)
 ///   e_y_dot   = v sin(e_psi + beta),   gamma_dot = sat((u - gamma) / lag),   u_dot = w
 /// (Corke & Ridley 2001 in path-error form). g and d are measured. beta is the front axle's slip angle:
 /// the tyres' quasi-static one, with C their cornering coefficient, and what a yaw gain g other than 1
-/// tells of the slip if both axles share it alike (v_y = -v_yr in the slip form of the kinematics). On a path that the steering can follow the optimum is the exact curvature
-/// inversion; where the path's curvature steps, it steers ahead and rounds the step off.
-/// Method: one differential-dynamic-programming sweep with a clamped scalar control (Tassa, Mansard &
-/// Todorov 2014, "Control-limited DDP") per call, started from the last call's solution shifted in time.
+/// tells of the slip if both axles share it alike (v_y = -v_yr in the slip form of the kinematics). On a
+/// path that the steering can follow the optimum is the exact curvature inversion; where the path's
+/// curvature steps, it steers ahead and rounds the step off. Method: one
+/// differential-dynamic-programming sweep with a clamped scalar control (Tassa, Mansard & Todorov 2014,
+/// "Control-limited DDP") per call, started from the last call's solution shifted in time.
 class PreviewPlanner {
  public:
   static constexpr std::size_t kStages = 32;
 
   PreviewPlanner(const TruckResponse& truck, const PreviewWeights& weights, double step);
 
-  /// Command rate to apply from now on [rad/s]. `elapsed` [s] since the last plan shifts the start; speed
-  /// [m/s] is held over the horizon. The path must not be empty.
-  double plan(const PathState& now, const geometry::Path& path, double speed, const YawResponse& believed,
-              double elapsed);
+  /// Command rate to apply from now on [rad/s]. `elapsed` [s] since the last plan shifts the start;
+  /// speed [m/s] is held over the horizon. The path must not be empty.
+  double plan(const PathState& now, const geometry::Path& path, double speed,
+              const YawResponse& believed, double elapsed);
   void reset();
 
   /// One step of the model with the mean curvature of the path over the step.
   PathState advance(const PathState& state, double command_rate, double speed, double curvature,
                     const YawResponse& believed, double step) const;
 
-  double horizon() const { return kStages * step_; }  ///< [s]
-  /// State that the plan reaches after `stage` steps.
-  const PathState& planned(std::size_t stage) const { return states_[stage]; }
+  double cost() const { return cost_; }  ///< of the last plan
 
  private:
   using Vector = Eigen::Vector4d;  ///< (offset, heading error, articulation, command)
   struct Linear;                   ///< derivatives of one step
 
   void shift(double elapsed);
-  /// Follows the plan from `now`; with a `correction` above 0, first changes it by that share of the last
-  /// sweep's corrections. Returns the cost.
-  double roll(const PathState& now, const geometry::Path& path, double speed, const YawResponse& believed,
-              double correction);
+  /// Follows the plan from `now`; with a `correction` above 0, first changes it by that share of the
+  /// last sweep's corrections. Returns the cost.
+  double roll(const PathState& now, const geometry::Path& path, double speed,
+              const YawResponse& believed, double correction);
   void sweep(double speed, const YawResponse& believed);
   Linear linearise(const PathState& state, double rate, double speed, double curvature,
                    const YawResponse& believed) const;
   double rateLimit(std::size_t stage) const {
-    return truck_.max_rate * std::max(weights_.rate_share, 1.0 - 0.05 * static_cast<double>(stage));
+    return truck_.max_rate * std::max(weights_.rate_share, 1.0 - 0.10 * static_cast<double>(stage));
   }
   /// Heading error with which the course follows a path of this curvature despite the slip [rad].
   double courseOffset(double speed, double curvature, const YawResponse& believed) const;
-  double cost(const PathState& state, double curvature, double speed, const YawResponse& believed) const;
+  double stageCost(const PathState& state, double curvature, double speed,
+                   const YawResponse& believed) const;
 
   TruckResponse truck_;
   PreviewWeights weights_;
-  double step_;   ///< [s]
+  double step_;  ///< [s]
+  double cost_ = 0.0;
   double share_;  ///< of the way to the command that the articulation goes in one step [1]
   std::array<double, kStages> rates_{};       ///< the plan [rad/s]
   std::array<double, kStages> curvatures_{};  ///< met on the way [1/m]

@@ -20,9 +20,9 @@ struct YawObserverParameters {
 
 /// Learns gain g and disturbance d of
 ///   yaw rate = (g v sin(gamma) + l_r gamma_dot) / (l_f cos(gamma) + l_r) + v d
-/// from gyro, articulation and speed, with a two-state Kalman filter whose state returns to the prior and
-/// whose uncertainty returns to the prior with the time `memory` (Ornstein-Uhlenbeck), so that it never
-/// winds up where nothing is excited.
+/// from gyro, articulation and speed, with a two-state Kalman filter whose state returns to the prior
+/// and whose uncertainty returns to the prior with the time `memory` (Ornstein-Uhlenbeck), so that it
+/// never winds up where nothing is excited.
 class YawObserver {
  public:
   YawObserver(const YawObserverParameters& parameters, const vehicle::TruckGeometry& geometry);
@@ -36,7 +36,7 @@ class YawObserver {
  private:
   YawObserverParameters parameters_;
   vehicle::TruckGeometry geometry_;
-  Eigen::Vector2d state_;       ///< (g - prior g, d)
+  Eigen::Vector2d state_;  ///< (g - prior g, d)
   Eigen::Matrix2d covariance_;
 };
 

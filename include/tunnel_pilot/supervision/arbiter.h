@@ -22,8 +22,8 @@ namespace tunnel_pilot::supervision {
 /// One row of the arbiter's table.
 struct SourceRule {
   Source source;
-  int priority;      ///< the highest healthy one steers
-  double max_age;    ///< since its proposal was received [s]
+  int priority;    ///< the highest healthy one steers
+  double max_age;  ///< since its proposal was received [s]
   bool steers;
   bool gives_speed;  ///< the lowest speed of all healthy sources wins
 };
@@ -31,23 +31,23 @@ struct SourceRule {
 /// config/arbiter.yaml.
 struct ArbiterParameters {
   std::vector<SourceRule> sources;
-  bool needs_truck_state;      ///< false: a truck without the bridge, taken as engaged from the start
-  bool wall_checks;            ///< false only where there are no walls (lane-change experiments)
-  double max_stamp_age;        ///< of a proposal's measurement [s]
-  double max_future;           ///< of any stamp [s]
-  double scan_degraded_age;    ///< without a new scan: slowly [s]
-  double scan_stop_age;        ///< ... stop [s]
-  double motion_stop_age;      ///< [s]
-  double truck_state_stop_age; ///< [s]
-  double tunnel_grace;         ///< without a valid tunnel: slowly, then stop [s]
-  double recovery_time;        ///< of health before driving fast again [s]
-  double degraded_speed;       ///< [m/s]
-  double dead_reckoning_age;   ///< oldest centerline a stop is steered along [s]
-  int obstacle_scans;          ///< with an obstruction, one after the other, that stop
-  double tracking_tolerance;   ///< articulation from its expected answer [rad]
-  double tracking_time;        ///< [s]
-  int limit_hits;              ///< of angle or lateral acceleration within recovery_time: slowly
-  double clock_jump;           ///< a pause of the clock beyond this is a jump [s]
+  bool needs_truck_state;       ///< false: a truck without the bridge, taken as engaged from the start
+  bool wall_checks;             ///< false only where there are no walls (lane-change experiments)
+  double max_stamp_age;         ///< of a proposal's measurement [s]
+  double max_future;            ///< of any stamp [s]
+  double scan_degraded_age;     ///< without a new scan: slowly [s]
+  double scan_stop_age;         ///< ... stop [s]
+  double motion_stop_age;       ///< [s]
+  double truck_state_stop_age;  ///< [s]
+  double tunnel_grace;          ///< without a valid tunnel: slowly, then stop [s]
+  double recovery_time;         ///< of health before driving fast again [s]
+  double degraded_speed;        ///< [m/s]
+  double dead_reckoning_age;    ///< oldest centerline a stop is steered along [s]
+  int obstacle_scans;           ///< with an obstruction, one after the other, that stop
+  double tracking_tolerance;    ///< articulation from its expected answer [rad]
+  double tracking_time;         ///< [s]
+  int limit_hits;               ///< of angle or lateral acceleration within recovery_time: slowly
+  double clock_jump;            ///< a pause of the clock beyond this is a jump [s]
   SpeedGovernorParameters governor;
   EnvelopeParameters envelope;
   CommandLimiterParameters limiter;
@@ -66,15 +66,15 @@ struct TruckState {
 /// What the arbiter lets out, and why.
 struct Decision {
   Command command;
-  bool degraded = false;              ///< driving slowly because of command.reason
+  bool degraded = false;  ///< driving slowly because of command.reason
   Source speed_source = Source::kNone;
-  double speed_limit = 0.0;           ///< the governor's [m/s]
+  double speed_limit = 0.0;  ///< the governor's [m/s]
   SpeedLimit limited_by = SpeedLimit::kStop;
-  double clearance_left = 0.0;        ///< [m], NaN unknown
+  double clearance_left = 0.0;  ///< [m], NaN unknown
   double clearance_right = 0.0;
-  double free_distance = 0.0;         ///< [m]
-  double stopping_distance = 0.0;     ///< [m]
-  std::vector<geometry::Point> corridor_left;   ///< in base_link of the scan [m]
+  double free_distance = 0.0;                  ///< [m]
+  double stopping_distance = 0.0;              ///< [m]
+  std::vector<geometry::Point> corridor_left;  ///< in base_link of the scan [m]
   std::vector<geometry::Point> corridor_right;
   CommandLimiter::Flags limits;
 };
@@ -201,8 +201,8 @@ class Arbiter {
   Reason obstruction_ = Reason::kObstacle;
 
   Decision decision_;
-  std::optional<Stamp> last_;     ///< decision
-  bool started_ = false;          ///< the limiter knows where the articulation stands
+  std::optional<Stamp> last_;  ///< decision
+  bool started_ = false;       ///< the limiter knows where the articulation stands
   std::optional<Reason> latched_;
   std::optional<Stamp> latched_at_;
   Reason slow_reason_ = Reason::kNone;

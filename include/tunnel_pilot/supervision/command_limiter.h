@@ -27,7 +27,8 @@ CommandLimiterParameters loadCommandLimiter(config::Node node);
 ///   rate:    |d(gamma)/dt| <= max_articulation_rate. As the last stage it holds always; where it delays
 ///            the angle, the speed is lowered to keep the lateral acceleration, as braking allows;
 ///   speed:   0 <= v <= max_speed, acceleration and deceleration, jerk.
-/// What lies inside all limits passes untouched. A stop's speed is 0 at once: the truck brakes as it can.
+/// What lies inside all limits passes untouched. A stop's speed is 0 at once: the truck brakes as it
+/// can.
 class CommandLimiter {
  public:
   struct Request {

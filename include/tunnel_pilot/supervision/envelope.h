@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "tunnel_pilot/config/node.h"
@@ -14,13 +15,13 @@
 namespace tunnel_pilot::supervision {
 
 struct EnvelopeParameters {
-  double margin;              ///< least distance between swept bodies and walls or obstacles [m]
-  double smallest_obstacle;   ///< [m]
-  int obstacle_points;        ///< returns, one beside the other, that make an obstacle
-  double deceleration;        ///< a stop's, guaranteed [m/s^2]
-  double reaction_time;       ///< from measurement to braking [s]
-  double reserve;             ///< between the nose and an obstacle after a stop [m]
-  double horizon;             ///< longest corridor ahead of the front axle [m]
+  double margin;             ///< least distance between swept bodies and walls or obstacles [m]
+  double smallest_obstacle;  ///< [m]
+  int obstacle_points;       ///< returns, one beside the other, that make an obstacle
+  double deceleration;       ///< a stop's, guaranteed [m/s^2]
+  double reaction_time;      ///< from measurement to braking [s]
+  double reserve;            ///< between the nose and an obstacle after a stop [m]
+  double horizon;            ///< longest corridor ahead of the front axle [m]
   drivers::PathFollowerGains follower;  ///< how the expected way returns to the centerline
 };
 
@@ -31,7 +32,7 @@ EnvelopeParameters loadEnvelope(config::Node node);
 /// The truck is driven ahead on paper: for the reaction time with the articulation commanded now, then
 /// back to the measured centerline (PathFollower), within the steering's rate; without a centerline the
 /// commanded articulation is held. Outline points of both bodies (nose, axles, hinge, tail, both sides)
-/// are laid beside the front axle's way, the spine, which goes on backwards through the truck to its
+/// draw lines beside the front axle's way, the spine, which goes on backwards through the truck to its
 /// tail: each metre of it has a left and a right edge. Walls, remembered walls and returns are laid
 /// beside the same spine and compared.
 /// Free space is only what was seen: it ends with the centerline, or else with the walls.
@@ -40,7 +41,7 @@ class Envelope {
  public:
   struct Input {
     const perception::Walls& walls;
-    const std::vector<geometry::Point>& points;   ///< returns in scan order [m]
+    const std::vector<geometry::Point>& points;  ///< returns in scan order [m]
     const geometry::Path& centerline;
     const drivers::ArticulationProfile& profile;  ///< of the centerline; empty where there is none
     geometry::Pose path_frame;                    ///< the centerline's frame, in base_link of the scan
@@ -52,11 +53,11 @@ class Envelope {
   };
   enum class End { kSight, kWall, kObstacle };
   struct Result {
-    double clearance_left = 0.0;   ///< smallest distance of the swept bodies to the wall [m], NaN unknown
+    double clearance_left = 0.0;  ///< smallest distance of the swept bodies to the wall [m], NaN unknown
     double clearance_right = 0.0;
-    double free_distance = 0.0;    ///< ahead of the nose along the corridor [m]
+    double free_distance = 0.0;  ///< ahead of the nose along the corridor [m]
     End free_until = End::kSight;
-    std::vector<geometry::Point> corridor_left;   ///< edges, tail to front [m]
+    std::vector<geometry::Point> corridor_left;  ///< edges, tail to front [m]
     std::vector<geometry::Point> corridor_right;
   };
 
@@ -73,10 +74,10 @@ class Envelope {
 
  private:
   struct Station {
-    geometry::Point point;      ///< on the spine
-    geometry::Point direction;  ///< unit, forward
-    double s;                   ///< from the front axle, forward [m]
-    double left, right;         ///< corridor's edges beside it, -inf/+inf where nothing passes [m]
+    geometry::Point point;         ///< on the spine
+    geometry::Point direction;     ///< unit, forward
+    double s;                      ///< from the front axle, forward [m]
+    double left, right;            ///< corridor's edges beside it, -inf/+inf where nothing passes [m]
     double wall_left, wall_right;  ///< nearest wall, +inf/-inf where none is known [m]
   };
   struct Beside {
@@ -94,15 +95,18 @@ class Envelope {
 
   void layTruck(const Input& input);
   void layWay(const Input& input);
-  void sweepBodies(std::size_t station, const Posture& posture);
-  void placeWall(const Beside& place, bool left);
-  void layWall(const perception::Wall& wall, bool left);
-  void layMemory(const Input& input);
+  void sweepBodies(std::size_t station, const Posture& posture, bool first);
+  void layWall(const Input& input, bool left);
   void remember(const Input& input);
   void compareWalls();
   void findObstacles(const std::vector<geometry::Point>& points);
   void limitSight(const Input& input);
+  bool inCorridor(const Beside& place) const;
   void drawCorridor();
+  template <typename Take>
+  void between(const Beside& a, const Beside& b, const Take& take);
+  void layEdge(const Beside& a, const Beside& b, bool left);
+  void layWallPiece(const Beside& a, const Beside& b, bool left);
   void endFreeSpace(double s, End why);
   Beside beside(const geometry::Point& point, std::size_t near) const;
   void addStation(const geometry::Point& point, double heading, double s);
@@ -112,9 +116,12 @@ class Envelope {
   vehicle::TruckGeometry geometry_;
   Result result_;
   std::vector<Station> stations_;
-  std::vector<Posture> postures_;  ///< along the way ahead
-  std::size_t front_axle_ = 0;  ///< station of the front axle now
-  double wall_end_ = 0.0;       ///< farthest station with a wall [m]
+  static constexpr std::size_t kFrontOutline = 3;  ///< nose, front axle, hinge
+  static constexpr std::size_t kOutline = 7;       ///< hinge, middle, rear axle, tail
+  std::array<Beside, 2 * kOutline> outline_{};     ///< of the last posture, left side first
+  std::vector<Posture> postures_;                  ///< along the way ahead
+  std::size_t front_axle_ = 0;                     ///< station of the front axle now
+  double wall_end_ = 0.0;                          ///< farthest station with a wall [m]
   std::array<Remembered, 64> memory_{};
   std::size_t remembered_ = 0;  ///< number ever remembered
   geometry::Point last_remembered_at_{0.0, 0.0};

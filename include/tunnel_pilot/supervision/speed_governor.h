@@ -10,15 +10,15 @@ namespace tunnel_pilot::supervision {
 
 /// What holds the speed.
 enum class SpeedLimit : std::uint8_t {
-  kNone = 0,                 ///< the highest speed configured
-  kDriver = 1,               ///< the lowest speed that a source asks for
+  kNone = 0,    ///< the highest speed configured
+  kDriver = 1,  ///< the lowest speed that a source asks for
   kLateralAcceleration = 2,
   kArticulationRate = 3,
-  kSight = 4,                ///< the truck must stop within what it sees
-  kObstacle = 5,             ///< ... within the free distance
+  kSight = 4,     ///< the truck must stop within what it sees
+  kObstacle = 5,  ///< ... within the free distance
   kDegraded = 6,
   kStop = 7,
-  kLimiter = 8,              ///< acceleration or jerk: on the way to the speed asked for
+  kLimiter = 8,  ///< acceleration or jerk: on the way to the speed asked for
 };
 std::string toString(SpeedLimit limit);
 
@@ -41,8 +41,8 @@ SpeedGovernorParameters loadSpeedGovernor(config::Node node);
 ///   centerline, reached by braking at b after the reaction time t_r:
 ///     v <= -b t_r + sqrt((b t_r)^2 + v_point^2 + 2 b distance), and v <= v_point where it is reached;
 ///   and the sight-limited stopping speed, the same with v_point = 0 at the end of what is seen.
-/// gamma_ref is the exact curvature inversion (ArticulationProfile); its slope is averaged over a window,
-/// because steering may round off what the path does within it.
+/// gamma_ref is the exact curvature inversion (ArticulationProfile); its slope is averaged over a
+/// window, because steering may round off what the path does within it.
 class SpeedGovernor {
  public:
   struct Limit {

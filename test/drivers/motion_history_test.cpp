@@ -1,0 +1,65 @@
+#include "tunnel_pilot/drivers/motion_history.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace tunnel_pilot::drivers {
+namespace {
+
+Motion at(double time, double x, double heading = 0.0) {
+  Motion motion;
+  motion.stamp = fromSeconds(time);
+  motion.pose = {x, 0.0, heading};
+  motion.speed = 2.0;
+  motion.yaw_rate = 0.5;
+  return motion;
+}
+
+TEST(MotionHistory, HasNoPoseBeforeAnyMotion) { EXPECT_FALSE(MotionHistory().poseAt(fromSeconds(1.0))); }
+
+TEST(MotionHistory, InterpolatesBetweenSamples) {
+  MotionHistory history;
+  history.add(at(1.0, 0.0));
+  history.add(at(1.1, 0.2));
+  ASSERT_TRUE(history.poseAt(fromSeconds(1.05)));
+  EXPECT_NEAR(history.poseAt(fromSeconds(1.05))->x, 0.1, 1e-9);
+}
+
+TEST(MotionHistory, ExtrapolatesWithTheEndsSpeedAndYawRate) {
+  MotionHistory history;
+  history.add(at(1.0, 0.0));
+  const auto pose = history.poseAt(fromSeconds(1.2));
+  ASSERT_TRUE(pose);
+  // An arc of 0.4 m that turns by 0.1 rad.
+  EXPECT_NEAR(pose->x, 4.0 * std::sin(0.1), 1e-6);
+  EXPECT_NEAR(pose->y, 4.0 * (1.0 - std::cos(0.1)), 1e-6);
+  EXPECT_NEAR(pose->heading, 0.1, 1e-9);
+}
+
+TEST(MotionHistory, HasNoPoseBeyondItsReach) {
+  MotionHistory history;
+  history.add(at(1.0, 0.0));
+  EXPECT_TRUE(history.poseAt(fromSeconds(1.29)));
+  EXPECT_FALSE(history.poseAt(fromSeconds(1.31)));
+  EXPECT_FALSE(history.poseAt(fromSeconds(0.69)));
+}
+
+TEST(MotionHistory, IgnoresOldAndNonFiniteMotion) {
+  MotionHistory history;
+  history.add(at(1.0, 0.0));
+  history.add(at(0.9, 5.0));
+  history.add(at(1.1, std::numeric_limits<double>::quiet_NaN()));
+  EXPECT_EQ(history.latest().stamp, fromSeconds(1.0));
+}
+
+TEST(MotionHistory, KeepsTheLastSecondsWhenItsRingHasGoneRound) {
+  MotionHistory history;
+  for (int i = 0; i < 500; ++i) history.add(at(0.02 * i, 0.04 * i));
+  const auto pose = history.poseAt(fromSeconds(9.51));
+  ASSERT_TRUE(pose);
+  EXPECT_NEAR(pose->x, 19.02, 1e-9);
+}
+
+}  // namespace
+}  // namespace tunnel_pilot::drivers

@@ -1,0 +1,104 @@
+#include "tunnel_pilot/drivers/preview_planner.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "tunnel_pilot/vehicle/articulation.h"
+
+namespace tunnel_pilot::drivers {
+namespace {
+
+constexpr double kStep = 0.15;     // [s]
+constexpr double kMaxRate = 0.26;  // [rad/s]
+
+vehicle::TruckGeometry geometryOfTruck() {
+  return vehicle::loadTruck(std::string(TUNNEL_PILOT_SOURCE_DIR) + "/config/truck.yaml").geometry;
+}
+
+PreviewPlanner planner(double rate_share = 1.0) {
+  return {{geometryOfTruck(), 0.2, kMaxRate, 0.75, 0.0}, {4.0, 2.0, 0.7, 5.0, rate_share}, kStep};
+}
+
+geometry::Path straight() { return geometry::buildPath({{60.0, 0.0, 0.0}}, {}, 0.5); }
+
+// Settles the plan for a standing situation.
+double planned(PreviewPlanner& planner, const PathState& state, const geometry::Path& path,
+               double speed) {
+  double rate = 0.0;
+  for (int i = 0; i < 20; ++i) rate = planner.plan(state, path, speed, {}, 0.0);
+  return rate;
+}
+
+TEST(PreviewPlanner, LeavesATruckOnAStraightPathAlone) {
+  PreviewPlanner p = planner();
+  EXPECT_NEAR(planned(p, {5.0, 0.0, 0.0, 0.0, 0.0}, straight(), 3.0), 0.0, 1e-9);
+}
+
+TEST(PreviewPlanner, SteersRightFromTheLeftOfThePath) {
+  PreviewPlanner p = planner();
+  EXPECT_LT(planned(p, {5.0, 0.3, 0.0, 0.0, 0.0}, straight(), 3.0), -0.01);
+}
+
+TEST(PreviewPlanner, IsAsymmetricNowhere) {
+  PreviewPlanner left = planner();
+  PreviewPlanner right = planner();
+  EXPECT_NEAR(planned(left, {5.0, 0.3, 0.1, 0.05, 0.02}, straight(), 3.0),
+              -planned(right, {5.0, -0.3, -0.1, -0.05, -0.02}, straight(), 3.0), 1e-9);
+}
+
+TEST(PreviewPlanner, NeverPlansBeyondTheRateLimit) {
+  PreviewPlanner p = planner();
+  for (const double offset : {-3.0, -1.0, 1.0, 3.0}) {
+    EXPECT_LE(std::abs(planned(p, {5.0, offset, 0.4, 0.0, 0.0}, straight(), 4.0)), kMaxRate);
+  }
+}
+
+TEST(PreviewPlanner, SteersAheadOfACurvatureStep) {
+  const geometry::Path path = geometry::buildPath({{20.0, 0.0, 0.0}, {30.0, 0.08, 0.08}}, {}, 0.25);
+  PreviewPlanner p = planner();
+  EXPECT_NEAR(planned(p, {2.0, 0.0, 0.0, 0.0, 0.0}, path, 3.0), 0.0, 0.02);
+  PathState near{18.5, 0.0, 0.0, 0.0, 0.0};
+  EXPECT_GT(planned(p, near, path, 3.0), 0.05);
+}
+
+TEST(PreviewPlanner, HoldsTheSteadyArticulationOnAnArc) {
+  const geometry::Path path = geometry::buildPath({{60.0, 0.08, 0.08}}, {}, 0.25);
+  const double steady = vehicle::steadyArticulation(geometryOfTruck(), 0.08);
+  PreviewPlanner p = planner();
+  EXPECT_NEAR(planned(p, {5.0, 0.0, 0.0, steady, steady}, path, 3.0), 0.0, 0.003);
+}
+
+TEST(PreviewPlanner, NeverMakesThePlanWorse) {
+  // The cost after each plan, for a standing situation far from the path, falls or stays.
+  PreviewPlanner p = planner();
+  const PathState state{5.0, 1.5, 0.35, 0.0, 0.0};
+  const geometry::Path path = straight();
+  p.plan(state, path, 2.0, {}, 0.0);
+  const double first = p.cost();
+  double last = first;
+  for (int i = 0; i < 30; ++i) {
+    p.plan(state, path, 2.0, {}, 0.0);
+    EXPECT_LE(p.cost(), last + 1e-12);
+    last = p.cost();
+  }
+  EXPECT_LT(last, 0.95 * first);
+}
+
+TEST(PreviewPlanner, ItsModelMatchesTheKinematicsOnASteadyTurn) {
+  // 12 deg at 3 m/s: yaw rate 7.05 deg/s (the paper's steady turn).
+  const PreviewPlanner p = planner();
+  const double gamma = 12.0 * M_PI / 180.0;
+  const PathState next = p.advance({0.0, 0.0, 0.0, gamma, gamma}, 0.0, 3.0, 0.0, {}, 0.1);
+  EXPECT_NEAR(next.heading_error / 0.1 * 180.0 / M_PI, 7.05, 0.02);
+}
+
+TEST(PreviewPlanner, RecoversFromAStateThatIsNotANumber) {
+  PreviewPlanner p = planner();
+  p.plan({5.0, std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0, 0.0}, straight(), 3.0, {}, 0.03);
+  EXPECT_NEAR(planned(p, {5.0, 0.0, 0.0, 0.0, 0.0}, straight(), 3.0), 0.0, 1e-9);
+}
+
+}  // namespace
+}  // namespace tunnel_pilot::drivers
