@@ -1,9 +1,9 @@
 #include "tunnel_pilot/ros/arbiter_ros.h"
 
-#include <utility>
+#include <ros/console.h>
 
 #include <boost/make_shared.hpp>
-#include <ros/console.h>
+#include <utility>
 
 #include "tunnel_pilot/ros/parameters.h"
 
@@ -31,8 +31,8 @@ ArbiterRos::ArbiterRos(ros::NodeHandle nh, ros::NodeHandle private_nh)
   if (ros::Time::isSimTime()) {
     timer_ = nh.createTimer(ros::Duration(kPeriod), [this](const ros::TimerEvent&) { decide(); });
   } else {
-    wall_timer_ = nh.createWallTimer(ros::WallDuration(kPeriod),
-                                     [this](const ros::WallTimerEvent&) { decide(); });
+    wall_timer_ =
+        nh.createWallTimer(ros::WallDuration(kPeriod), [this](const ros::WallTimerEvent&) { decide(); });
   }
 }
 
@@ -43,8 +43,8 @@ void ArbiterRos::listen(ros::NodeHandle& nh, const std::string& topic, Callback 
         checkClock();
         callback(*message);
       };
-  subscribers_.push_back(nh.subscribe<Message>(topic, 2, call, ros::VoidConstPtr(),
-                                               ros::TransportHints().tcpNoDelay()));
+  subscribers_.push_back(
+      nh.subscribe<Message>(topic, 2, call, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
 }
 
 void ArbiterRos::subscribe(ros::NodeHandle& nh) {
@@ -91,7 +91,8 @@ void ArbiterRos::onProposal(supervision::Source source, const Proposal& message)
 void ArbiterRos::onPoints(const sensor_msgs::PointCloud2& message) {
   const auto cloud = message.header.frame_id == kBaseFrame ? toCore(message) : nullptr;
   if (!cloud) {
-    ROS_ERROR_THROTTLE(1.0, "arbiter: a cloud that is not in base_link or has no x, y, z is passed over");
+    ROS_ERROR_THROTTLE(1.0,
+                       "arbiter: a cloud that is not in base_link or has no x, y, z is passed over");
     return;
   }
   arbiter_.setPoints(*cloud, toCore(message.header.stamp), now());
@@ -107,7 +108,8 @@ bool ArbiterRos::onStop(std_srvs::Trigger::Request&, std_srvs::Trigger::Response
 
 bool ArbiterRos::onReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
   response.success = arbiter_.reset(now());
-  response.message = response.success ? "reset" : "refused: the truck moves, or " + toString(last_.command.reason);
+  response.message =
+      response.success ? "reset" : "refused: the truck moves, or " + toString(last_.command.reason);
   return true;
 }
 

@@ -8,7 +8,7 @@
 namespace tunnel_pilot::shell {
 namespace {
 
-constexpr double kTickPeriod = 0.005;                           // [s] steady time
+constexpr double kTickPeriod = 0.005;  // [s] steady time
 constexpr Stamp kStatusPeriod = std::chrono::milliseconds(100);
 
 }  // namespace
@@ -47,8 +47,8 @@ void CanBridgeRos::advertiseEdge(ros::NodeHandle& nh, const std::string& name, E
     const auto answer = (bridge_.get()->*edge)(current());
     response.success = answer.accepted;
     response.message = answer.reason;
-    ROS_INFO("can_bridge: %s %s %s", name.c_str(), answer.accepted ? "accepted" : "refused:",
-             answer.reason.c_str());
+    ROS_INFO("can_bridge: %s %s %s", name.c_str(),
+             answer.accepted ? "accepted" : "refused:", answer.reason.c_str());
     return true;
   };
   services_.push_back(nh.advertiseService<Trigger::Request, Trigger::Response>(
@@ -107,8 +107,10 @@ void CanBridgeRos::fillStatus(Diagnostics::Status& status) const {
   const std::string words = toString(s.state) + ": " + toString(s.reason);
   const bool stop = bridge::isStop(s.state);
   const bool driving = s.state == bridge::SafetyState::kActive;
-  status.summary(stop ? Diagnostics::Status::ERROR
-                      : driving ? Diagnostics::Status::OK : Diagnostics::Status::WARN, words);
+  status.summary(stop      ? Diagnostics::Status::ERROR
+                 : driving ? Diagnostics::Status::OK
+                           : Diagnostics::Status::WARN,
+                 words);
   status.add("feedback age [s]", s.feedback_age);
   status.add("command age [s]", s.command_age);
   status.add("tracking error [rad]", s.tracking_error);

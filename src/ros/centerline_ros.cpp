@@ -1,7 +1,8 @@
 #include "tunnel_pilot/ros/centerline_ros.h"
 
-#include <boost/make_shared.hpp>
 #include <ros/console.h>
+
+#include <boost/make_shared.hpp>
 
 #include "tunnel_pilot/ros/conversions.h"
 #include "tunnel_pilot/ros/parameters.h"
@@ -12,10 +13,10 @@ CenterlineRos::CenterlineRos(ros::NodeHandle nh, ros::NodeHandle private_nh)
     : estimator_(perception::loadCenterline(Parameters(private_nh).rest())),
       path_publisher_(nh.advertise<nav_msgs::Path>("centerline", 1)),
       state_publisher_(nh.advertise<TunnelState>("tunnel_state", 1)),
-      odometry_subscriber_(nh.subscribe("odom", 5, &CenterlineRos::onOdometry, this,
-                                        ros::TransportHints().tcpNoDelay())),
-      walls_subscriber_(nh.subscribe("walls", 1, &CenterlineRos::onWalls, this,
-                                     ros::TransportHints().tcpNoDelay())),
+      odometry_subscriber_(
+          nh.subscribe("odom", 5, &CenterlineRos::onOdometry, this, ros::TransportHints().tcpNoDelay())),
+      walls_subscriber_(
+          nh.subscribe("walls", 1, &CenterlineRos::onWalls, this, ros::TransportHints().tcpNoDelay())),
       diagnostics_(nh, private_nh, "centerline", [this](auto& status) { fillStatus(status); }) {}
 
 void CenterlineRos::checkClock() {

@@ -1,10 +1,10 @@
 #include "tunnel_pilot/ros/conversions.h"
 
+#include <pcl_conversions/pcl_conversions.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
-
-#include <pcl_conversions/pcl_conversions.h>
 
 namespace tunnel_pilot::shell {
 namespace {
@@ -89,6 +89,7 @@ geometry::Scan toCore(const sensor_msgs::LaserScan& message) {
   scan.stamp = toCore(message.header.stamp);
   scan.angle_min = message.angle_min;
   scan.angle_increment = message.angle_increment;
+  scan.announced_angle_max = message.angle_max;
   scan.time_increment = message.time_increment;
   scan.range_min = message.range_min;
   scan.range_max = message.range_max;
@@ -113,8 +114,8 @@ sensor_msgs::LaserScan toRos(const geometry::Scan& scan, const std::string& fram
 pcl::PointCloud<pcl::PointXYZ>::Ptr toCore(const sensor_msgs::PointCloud2& message) {
   const bool has_points = hasFloat(message, "x") && hasFloat(message, "y") && hasFloat(message, "z");
   const std::uint64_t row = std::uint64_t{message.width} * message.point_step;
-  const bool holds_all = row <= message.row_step &&
-                         std::uint64_t{message.row_step} * message.height <= message.data.size();
+  const bool holds_all =
+      row <= message.row_step && std::uint64_t{message.row_step} * message.height <= message.data.size();
   if (!has_points || !holds_all || message.is_bigendian) return nullptr;
   pcl::PointCloud<pcl::PointXYZ>::Ptr cloud(new pcl::PointCloud<pcl::PointXYZ>);
   pcl::fromROSMsg(message, *cloud);
@@ -132,6 +133,7 @@ sensor_msgs::PointCloud2 toRos(const pcl::PointCloud<pcl::PointXYZ>& cloud, Stam
 perception::Walls toCore(const Walls& message) {
   perception::Walls walls;
   walls.stamp = toCore(message.header.stamp);
+  walls.enough_returns = message.enough_returns;
   walls.left = toCore(message.left);
   walls.right = toCore(message.right);
   return walls;
@@ -141,6 +143,7 @@ Walls toRos(const perception::Walls& walls, const pcl::PointCloud<pcl::PointXYZ>
   Walls message;
   message.header.stamp = toRos(walls.stamp);
   message.header.frame_id = kBaseFrame;
+  message.enough_returns = walls.enough_returns;
   message.left = toRos(walls.left, cloud);
   message.right = toRos(walls.right, cloud);
   return message;

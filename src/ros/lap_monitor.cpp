@@ -1,12 +1,12 @@
 #include "tunnel_pilot/ros/lap_monitor.h"
 
+#include <ros/ros.h>
+#include <std_srvs/Trigger.h>
+
 #include <cmath>
 #include <cstdio>
 #include <fstream>
-
 #include <nlohmann/json.hpp>
-#include <ros/ros.h>
-#include <std_srvs/Trigger.h>
 
 #include "tunnel_pilot/bridge/safety_state.h"
 #include "tunnel_pilot/ros/parameters.h"
@@ -14,7 +14,7 @@
 namespace tunnel_pilot::shell {
 namespace {
 
-constexpr double kTick = 0.25;        // [s] steady time
+constexpr double kTick = 0.25;  // [s] steady time
 constexpr int kTicksPerProgress = 8;
 constexpr double kDegrees = 57.29577951308232;
 
@@ -122,8 +122,10 @@ void LapMonitor::finish(const std::string& failure) {
   if (!track_.empty()) {
     const auto metrics = simulation::driveMetrics(track_, geometry::Path());
     const double time = (last_->header.stamp - first_->header.stamp).toSec();
-    if (reason.empty() && metrics.at("lateral_rms") > parameters_.lateral_rms_max) reason = "lateral RMS";
-    if (reason.empty() && metrics.at("lateral_max") > parameters_.lateral_max_max) reason = "lateral max";
+    if (reason.empty() && metrics.at("lateral_rms") > parameters_.lateral_rms_max)
+      reason = "lateral RMS";
+    if (reason.empty() && metrics.at("lateral_max") > parameters_.lateral_max_max)
+      reason = "lateral max";
     figures = {{"lap_time_s", rounded(time)},
                {"lateral_mean_m", rounded(metrics.at("lateral_mean"))},
                {"lateral_rms_m", rounded(metrics.at("lateral_rms"))},

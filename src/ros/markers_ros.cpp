@@ -14,9 +14,9 @@ namespace {
 using visualization_msgs::Marker;
 using visualization_msgs::MarkerArray;
 
-constexpr double kPathSpacing = 0.2;        // of the driven path's points [m]
-constexpr std::size_t kPathPoints = 3000;   // older ones are forgotten
-constexpr double kNear = 0.2, kFar = 0.8;   // clearances shown red and green [m]
+constexpr double kPathSpacing = 0.2;       // of the driven path's points [m]
+constexpr std::size_t kPathPoints = 3000;  // older ones are forgotten
+constexpr double kNear = 0.2, kFar = 0.8;  // clearances shown red and green [m]
 
 std_msgs::ColorRGBA color(float r, float g, float b, float a) {
   std_msgs::ColorRGBA c;
@@ -74,14 +74,16 @@ void addWall(const Wall& wall, const std_msgs::Header& header, const std::string
   markers.markers.push_back(curve.points.size() < 2 ? removal(curve) : curve);
 }
 
-// Distance of a corridor's edge point to a wall's curve, by its samples and the middles between them [m].
+// Distance of a corridor's edge point to a wall's curve, by its samples and the middles between them
+// [m].
 double distance(const geometry_msgs::Point32& point, const Wall& wall) {
   double least = kFar;
   for (std::size_t i = 0; i < wall.curve.size(); ++i) {
     const auto& a = wall.curve[i];
     const auto& b = wall.curve[i + 1 < wall.curve.size() ? i + 1 : i];
-    least = std::min({least, std::hypot(double{point.x} - a.x, double{point.y} - a.y),
-                      std::hypot(point.x - 0.5 * (double{a.x} + b.x), point.y - 0.5 * (double{a.y} + b.y))});
+    least =
+        std::min({least, std::hypot(double{point.x} - a.x, double{point.y} - a.y),
+                  std::hypot(point.x - 0.5 * (double{a.x} + b.x), point.y - 0.5 * (double{a.y} + b.y))});
   }
   return least;
 }
@@ -123,7 +125,8 @@ Marker stateText(const ArbiterState& state, const TruckStatus& status) {
   text.scale.z = 0.9;
   text.color = kTextColor;
   text.pose.position.z = 5.0;
-  text.text = bridge::toString(static_cast<bridge::SafetyState>(status.state)) + ": " + state.reason_text;
+  text.text =
+      bridge::toString(static_cast<bridge::SafetyState>(status.state)) + ": " + state.reason_text;
   return text;
 }
 

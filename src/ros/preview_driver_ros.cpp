@@ -1,7 +1,8 @@
 #include "tunnel_pilot/ros/preview_driver_ros.h"
 
-#include <boost/make_shared.hpp>
 #include <ros/console.h>
+
+#include <boost/make_shared.hpp>
 
 #include "tunnel_pilot/ros/parameters.h"
 

@@ -1,7 +1,8 @@
 #include "tunnel_pilot/ros/scan_filter_ros.h"
 
-#include <boost/make_shared.hpp>
 #include <ros/console.h>
+
+#include <boost/make_shared.hpp>
 
 #include "tunnel_pilot/ros/conversions.h"
 #include "tunnel_pilot/ros/parameters.h"
@@ -14,8 +15,8 @@ ScanFilterRos::ScanFilterRos(ros::NodeHandle nh, ros::NodeHandle private_nh)
     : filter_(perception::loadScanFilter(Parameters(private_nh).rest())),
       scan_publisher_(nh.advertise<sensor_msgs::LaserScan>("scan_filtered", 1)),
       points_publisher_(nh.advertise<sensor_msgs::PointCloud2>("points", 1)),
-      scan_subscriber_(nh.subscribe("scan", 1, &ScanFilterRos::onScan, this,
-                                    ros::TransportHints().tcpNoDelay())),
+      scan_subscriber_(
+          nh.subscribe("scan", 1, &ScanFilterRos::onScan, this, ros::TransportHints().tcpNoDelay())),
       diagnostics_(nh, private_nh, "scan_filter", [this](auto& status) { fillStatus(status); }) {}
 
 void ScanFilterRos::onScan(const sensor_msgs::LaserScan& message) {

@@ -1,9 +1,9 @@
 #include "tunnel_pilot/ros/sensor_pose.h"
 
-#include <cmath>
-
 #include <tf2/LinearMath/Matrix3x3.h>
 #include <tf2/LinearMath/Quaternion.h>
+
+#include <cmath>
 
 namespace tunnel_pilot::shell {
 namespace {

@@ -1,16 +1,17 @@
 #include "tunnel_pilot/ros/simulator_ros.h"
 
-#include <cmath>
-
 #include <ros/console.h>
 #include <rosgraph_msgs/Clock.h>
 #include <tunnel_pilot/SimulatorTruth.h>
 #include <visualization_msgs/Marker.h>
 
+#include <cmath>
+
 #include "tunnel_pilot/can/embedded_bus.h"
 #include "tunnel_pilot/can/layout.h"
 #include "tunnel_pilot/ros/conversions.h"
 #include "tunnel_pilot/ros/parameters.h"
+#include "tunnel_pilot/simulation/episode.h"
 
 namespace tunnel_pilot::shell {
 namespace {
@@ -24,7 +25,8 @@ constexpr double kWallHeight = 1.5;    // of the pictured walls [m]
 // True when the step from `before` to `now` reached another multiple of the period.
 bool isDue(Stamp before, Stamp now, Stamp period) { return before / period != now / period; }
 
-visualization_msgs::Marker lines(const std::string& ns, float red, float green, float blue, float alpha) {
+visualization_msgs::Marker lines(const std::string& ns, float red, float green, float blue,
+                                 float alpha) {
   visualization_msgs::Marker marker;
   marker.header.frame_id = kMapFrame;
   marker.ns = ns;
@@ -101,8 +103,8 @@ SimulatorRos::SimulatorRos(ros::NodeHandle nh, ros::NodeHandle private_nh) {
 void SimulatorRos::configure(const ros::NodeHandle& private_nh) {
   Parameters parameters(private_nh);
   const auto truck = takeTruck(parameters);
-  config::Node own = parameters.take({"truck_controller_file", "world_file", "bus", "load", "seed",
-                                      "reversed", "real_time_factor"});
+  config::Node own = parameters.take(
+      {"truck_controller_file", "world_file", "bus", "load", "seed", "reversed", "real_time_factor"});
   const auto controller =
       simulation::loadTruckController(config::loadFile(own.text("truck_controller_file")));
   real_time_factor_ = own.number("real_time_factor", "1", 0.0, 1000.0);
@@ -112,16 +114,17 @@ void SimulatorRos::configure(const ros::NodeHandle& private_nh) {
   options.seed = seed;
   options.reversed = own.boolean("reversed");
   auto world = world::loadWorld(own.text("world_file"), options);
-  bus_ = std::make_unique<BusTap>(std::make_unique<can::EmbeddedBus>(own.text("bus")), can::kTpCommandId);
+  bus_ =
+      std::make_unique<BusTap>(std::make_unique<can::EmbeddedBus>(own.text("bus")), can::kTpCommandId);
   own.finish();
 
   const auto simulator = simulation::loadSimulator(parameters.rest());
   scan_period_ = 1.0 / simulator.lidar.rate;
   const auto load = loaded ? vehicle::Load::kLoaded : vehicle::Load::kEmpty;
   const simulation::PlantChoice plant{simulation::PlantModel::kDynamic, load, true, 0.0};
-  simulator_ = std::make_unique<simulation::Simulator>(
-      simulator, controller, truck, simulation::makePlant(plant, truck, seed), load, std::move(world), seed,
-      *bus_);
+  simulator_ = std::make_unique<simulation::Simulator>(simulator, controller, truck,
+                                                       simulation::makePlant(plant, truck, seed), load,
+                                                       std::move(world), seed, *bus_);
   simulator_->place(simulator_->startPose());
 }
 
@@ -165,7 +168,8 @@ void SimulatorRos::advance() {
   if (isDue(before, now, kObstaclePeriod)) publishObstacles();
   if (!clock_due) return;
   const bool lockstep = command_lockstep_.alive && bridge_lockstep_.alive;
-  pace_.hold(now, lockstep || (real_time_factor_ > 0.0 && real_time_factor_ < 1.0) ? real_time_factor_ : 1.0);
+  pace_.hold(now,
+             lockstep || (real_time_factor_ > 0.0 && real_time_factor_ < 1.0) ? real_time_factor_ : 1.0);
   queue_.callAvailable();
 }
 
@@ -283,7 +287,9 @@ void SimulatorRos::fillStatus(Diagnostics::Status& status) {
   if (truth.contacts > 0) {
     status.summary(Diagnostics::Status::ERROR, "a body touched something");
   } else {
-    status.summary(Diagnostics::Status::OK, paused_ ? "paused" : lockstep ? "in lockstep" : "in real time");
+    status.summary(Diagnostics::Status::OK, paused_    ? "paused"
+                                            : lockstep ? "in lockstep"
+                                                       : "in real time");
   }
   status.add("time [s]", toSeconds(simulator_->now()));
   status.add("contacts", truth.contacts);

@@ -1,7 +1,8 @@
 #include "tunnel_pilot/ros/wall_segmentation_ros.h"
 
-#include <boost/make_shared.hpp>
 #include <ros/console.h>
+
+#include <boost/make_shared.hpp>
 
 #include "tunnel_pilot/ros/conversions.h"
 #include "tunnel_pilot/ros/parameters.h"
@@ -20,8 +21,10 @@ void WallSegmentationRos::onPoints(const sensor_msgs::PointCloud2& message) {
   last_refused_ = cloud == nullptr;
   if (last_refused_) {
     ++refused_;
-    ROS_ERROR_THROTTLE(1.0, "wall_segmentation: a cloud in frame '%s' is refused: it must be in '%s' and "
-                       "hold x, y, z", message.header.frame_id.c_str(), kBaseFrame);
+    ROS_ERROR_THROTTLE(1.0,
+                       "wall_segmentation: a cloud in frame '%s' is refused: it must be in '%s' and "
+                       "hold x, y, z",
+                       message.header.frame_id.c_str(), kBaseFrame);
     return;
   }
   ++clouds_;

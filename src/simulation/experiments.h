@@ -8,10 +8,6 @@
 
 namespace tunnel_pilot::simulation {
 
-/// The plant that a seed drives: with its own parameters where the scenario varies them, and its own road.
-std::unique_ptr<vehicle::Plant> makePlant(const PlantChoice& choice, const vehicle::TruckParameters& truck,
-                                          std::uint64_t seed);
-
 /// The parts of a track sample that the plant knows.
 TrackSample sampleOf(const vehicle::PlantState& state, const vehicle::TruckGeometry& truck);
 

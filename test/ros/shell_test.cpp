@@ -1,8 +1,8 @@
 // What the shells do without a ROS master: conversions, parameter trees, clocks, pairing of topics.
+#include <gtest/gtest.h>
+
 #include <cmath>
 #include <limits>
-
-#include <gtest/gtest.h>
 
 #include "tunnel_pilot/can/memory_bus.h"
 #include "tunnel_pilot/ros/bus_tap.h"

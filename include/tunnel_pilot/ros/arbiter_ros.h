@@ -1,11 +1,11 @@
 #pragma once
 
-#include <string>
-#include <vector>
-
 #include <ros/node_handle.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <std_srvs/Trigger.h>
+
+#include <string>
+#include <vector>
 
 #include "tunnel_pilot/ros/clock_watch.h"
 #include "tunnel_pilot/ros/conversions.h"
@@ -16,11 +16,12 @@
 namespace tunnel_pilot::shell {
 
 /// Shell of supervision::Arbiter. Subscribes `lidar_driver/proposal`, `preview_driver/proposal`,
-/// `teleoperation/proposal`, `walls`, `points`, `tunnel_state` with `centerline`, `odom`, `joint_states`, `truck_status`; publishes `command`
-/// and `arbiter_state`. Decides on every proposal and on a timer of 50 Hz (steady time, or simulated time
-/// with use_sim_time), so that silent inputs end in a stop, not in silence. Services ~stop and ~reset
-/// (std_srvs/Trigger) latch a stop and end it, for a truck without can_bridge; with it, use the bridge's.
-/// Parameters: config/arbiter.yaml and `truck_file`. Throws config::ConfigError.
+/// `teleoperation/proposal`, `walls`, `points`, `tunnel_state` with `centerline`, `odom`,
+/// `joint_states`, `truck_status`; publishes `command` and `arbiter_state`. Decides on every proposal
+/// and on a timer of 50 Hz (steady time, or simulated time with use_sim_time), so that silent inputs end
+/// in a stop, not in silence. Services ~stop and ~reset (std_srvs/Trigger) latch a stop and end it, for
+/// a truck without can_bridge; with it, use the bridge's. Parameters: config/arbiter.yaml and
+/// `truck_file`. Throws config::ConfigError.
 class ArbiterRos {
  public:
   ArbiterRos(ros::NodeHandle nh, ros::NodeHandle private_nh);

@@ -17,7 +17,8 @@ class BusTap : public can::Bus {
   static constexpr std::size_t kQueueLength = 4096;
 
   /// `counted` is the identifier to count.
-  BusTap(std::unique_ptr<can::Bus> bus, std::uint32_t counted) : bus_(std::move(bus)), counted_(counted) {}
+  BusTap(std::unique_ptr<can::Bus> bus, std::uint32_t counted)
+      : bus_(std::move(bus)), counted_(counted) {}
 
   bool send(const can::Frame& frame) override { return bus_->send(frame); }
   std::optional<can::Frame> receive() override;

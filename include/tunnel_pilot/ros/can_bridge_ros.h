@@ -1,14 +1,14 @@
 #pragma once
 
-#include <memory>
-#include <string>
-#include <vector>
-
 #include <ros/node_handle.h>
 #include <rosgraph_msgs/Clock.h>
 #include <std_srvs/Trigger.h>
 #include <tf2_ros/transform_broadcaster.h>
 #include <tunnel_pilot/TruckCommand.h>
+
+#include <memory>
+#include <string>
+#include <vector>
 
 #include "tunnel_pilot/bridge/can_bridge.h"
 #include "tunnel_pilot/can/embedded_bus.h"
@@ -18,9 +18,9 @@
 namespace tunnel_pilot::shell {
 
 /// Shell of bridge::CanBridge on the embedded bus. Subscribes `command`; publishes `joint_states`
-/// (articulation_joint), `odom`, TF odom -> base_link for every feedback of the truck, and `truck_status`
-/// with each of them and at least ten times a second. Services engage, release, stop, reset
-/// (std_srvs/Trigger): the message of a refusal says why.
+/// (articulation_joint), `odom`, TF odom -> base_link for every feedback of the truck, and
+/// `truck_status` with each of them and at least ten times a second. Services engage, release, stop,
+/// reset (std_srvs/Trigger): the message of a refusal says why.
 ///
 /// Time: without use_sim_time a steady timer of 200 Hz ticks the bridge; with it, each message of /clock
 /// does, so that a simulator in lockstep finds the bridge's frames at the same ticks in every run.

@@ -12,9 +12,9 @@
 namespace tunnel_pilot::shell {
 
 /// Shell of perception::CenterlineEstimator. Subscribes `walls` and `odom`; publishes `centerline`
-/// (nav_msgs/Path in base_link, empty while there is none) and `tunnel_state` (tunnel_pilot/TunnelState),
-/// in this order, for every walls message and with its stamp. Works without odometry, for a shorter reach.
-/// Parameters: config/centerline.yaml. Throws config::ConfigError.
+/// (nav_msgs/Path in base_link, empty while there is none) and `tunnel_state`
+/// (tunnel_pilot/TunnelState), in this order, for every walls message and with its stamp. Works without
+/// odometry, for a shorter reach. Parameters: config/centerline.yaml. Throws config::ConfigError.
 class CenterlineRos {
  public:
   CenterlineRos(ros::NodeHandle nh, ros::NodeHandle private_nh);

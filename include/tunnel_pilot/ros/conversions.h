@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string>
-
 #include <nav_msgs/Odometry.h>
 #include <nav_msgs/Path.h>
 #include <pcl/point_cloud.h>
@@ -15,6 +13,8 @@
 #include <tunnel_pilot/TruckStatus.h>
 #include <tunnel_pilot/TunnelState.h>
 #include <tunnel_pilot/Walls.h>
+
+#include <string>
 
 #include "tunnel_pilot/bridge/can_bridge.h"
 #include "tunnel_pilot/drivers/driver.h"

@@ -1,10 +1,10 @@
 #pragma once
 
-#include <functional>
-#include <string>
-
 #include <diagnostic_updater/diagnostic_updater.h>
 #include <ros/node_handle.h>
+
+#include <functional>
+#include <string>
 
 namespace tunnel_pilot::shell {
 

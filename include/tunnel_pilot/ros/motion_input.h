@@ -1,18 +1,18 @@
 #pragma once
 
-#include <optional>
-
 #include <nav_msgs/Odometry.h>
 #include <sensor_msgs/JointState.h>
+
+#include <optional>
 
 #include "tunnel_pilot/drivers/driver.h"
 
 namespace tunnel_pilot::shell {
 
 /// Makes one motion of the two topics that tell it: `odom` (pose, speed, yaw rate) and `joint_states`
-/// (articulation and, where the publisher knows it, its rate; otherwise the rate is the difference of the
-/// last two). The motion's stamp is the older of the two. Other joints' messages are passed over, and so
-/// are messages with numbers that are not finite: their age then tells.
+/// (articulation and, where the publisher knows it, its rate; otherwise the rate is the difference of
+/// the last two). The motion's stamp is the older of the two. Other joints' messages are passed over,
+/// and so are messages with numbers that are not finite: their age then tells.
 class MotionInput {
  public:
   void setJointState(const sensor_msgs::JointState& message);
@@ -32,7 +32,8 @@ class MotionInput {
   std::optional<drivers::Motion> odometry_;
 };
 
-/// Brings together the two topics that tell of one scan, `tunnel_state` and `centerline`, by their stamp.
+/// Brings together the two topics that tell of one scan, `tunnel_state` and `centerline`, by their
+/// stamp.
 class TunnelInput {
  public:
   void setState(const perception::TunnelState& state) { state_ = state; }

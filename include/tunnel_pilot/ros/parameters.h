@@ -1,11 +1,11 @@
 #pragma once
 
-#include <set>
-#include <string>
-
 #include <ros/node_handle.h>
 #include <xmlrpcpp/XmlRpcValue.h>
 #include <yaml-cpp/yaml.h>
+
+#include <set>
+#include <string>
 
 #include "tunnel_pilot/config/node.h"
 #include "tunnel_pilot/vehicle/truck_parameters.h"

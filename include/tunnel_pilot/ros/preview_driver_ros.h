@@ -1,8 +1,8 @@
 #pragma once
 
-#include <string>
-
 #include <ros/node_handle.h>
+
+#include <string>
 
 #include "tunnel_pilot/drivers/preview_driver.h"
 #include "tunnel_pilot/ros/clock_watch.h"
@@ -12,10 +12,10 @@
 
 namespace tunnel_pilot::shell {
 
-/// Shell of drivers::PreviewDriver. Subscribes `tunnel_state` and `centerline` (paired by stamp), `odom`,
-/// `joint_states`; publishes `preview_driver/proposal` (tunnel_pilot/Proposal) for every tunnel once the
-/// truck's motion is known. Parameters: config/preview_driver.yaml and `truck_file` (path of the truck's
-/// YAML). Throws config::ConfigError.
+/// Shell of drivers::PreviewDriver. Subscribes `tunnel_state` and `centerline` (paired by stamp),
+/// `odom`, `joint_states`; publishes `preview_driver/proposal` (tunnel_pilot/Proposal) for every tunnel
+/// once the truck's motion is known. Parameters: config/preview_driver.yaml and `truck_file` (path of
+/// the truck's YAML). Throws config::ConfigError.
 class PreviewDriverRos {
  public:
   PreviewDriverRos(ros::NodeHandle nh, ros::NodeHandle private_nh);

@@ -1,9 +1,9 @@
 #pragma once
 
-#include <string>
-
 #include <ros/node_handle.h>
 #include <sensor_msgs/LaserScan.h>
+
+#include <string>
 
 #include "tunnel_pilot/perception/scan_filter.h"
 #include "tunnel_pilot/ros/clock_watch.h"
@@ -13,10 +13,10 @@
 namespace tunnel_pilot::shell {
 
 /// Shell of perception::ScanFilter. Subscribes `scan` (any planar lidar that covers +-90 degrees), needs
-/// TF base_link -> the scan's frame once. Publishes `scan_filtered` (sensor_msgs/LaserScan, the network's
-/// 761 beams, frame of the scan) and `points` (sensor_msgs/PointCloud2 in base_link), both with the scan's
-/// stamp; nothing for a rejected scan, which is logged, counted and told on /diagnostics.
-/// Parameters: config/scan_filter.yaml. Throws config::ConfigError.
+/// TF base_link -> the scan's frame once. Publishes `scan_filtered` (sensor_msgs/LaserScan, the
+/// network's 761 beams, frame of the scan) and `points` (sensor_msgs/PointCloud2 in base_link), both
+/// with the scan's stamp; nothing for a rejected scan, which is logged, counted and told on
+/// /diagnostics. Parameters: config/scan_filter.yaml. Throws config::ConfigError.
 class ScanFilterRos {
  public:
   ScanFilterRos(ros::NodeHandle nh, ros::NodeHandle private_nh);

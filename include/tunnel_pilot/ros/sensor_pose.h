@@ -1,12 +1,12 @@
 #pragma once
 
-#include <memory>
-#include <optional>
-#include <string>
-
 #include <geometry_msgs/TransformStamped.h>
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/transform_listener.h>
+
+#include <memory>
+#include <optional>
+#include <string>
 
 #include "tunnel_pilot/geometry/pose.h"
 
@@ -17,7 +17,8 @@ namespace tunnel_pilot::shell {
 std::optional<geometry::Pose> planarMounting(const geometry_msgs::Transform& transform,
                                              std::string& why_not);
 
-/// Pose of a sensor in base_link, looked up once in TF and then kept: a sensor does not move on its body.
+/// Pose of a sensor in base_link, looked up once in TF and then kept: a sensor does not move on its
+/// body.
 class SensorPose {
  public:
   SensorPose();

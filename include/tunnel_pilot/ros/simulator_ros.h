@@ -1,8 +1,5 @@
 #pragma once
 
-#include <memory>
-#include <string>
-
 #include <nav_msgs/Odometry.h>
 #include <ros/callback_queue.h>
 #include <ros/node_handle.h>
@@ -10,6 +7,9 @@
 #include <std_srvs/Trigger.h>
 #include <tf2_ros/transform_broadcaster.h>
 #include <tunnel_pilot/TruckCommand.h>
+
+#include <memory>
+#include <string>
 
 #include "tunnel_pilot/drivers/motion_history.h"
 #include "tunnel_pilot/ros/bus_tap.h"
@@ -31,12 +31,13 @@ class Pace {
 };
 
 /// Shell of simulation::Simulator, stage-like: owns /clock, fixed step, one seed. The pilot gets CAN
-/// frames over the embedded bus and `scan` (frame `laser`, stamped at its first beam, published after the
-/// lidar's latency), and gives frames back; nothing else passes between them.
-/// For people and judges, on topics of its own: `~truth` (tunnel_pilot/SimulatorTruth), `~walls` and
+/// frames over the embedded bus and `scan` (frame `laser`, stamped at its first beam, published after
+/// the lidar's latency), and gives frames back; nothing else passes between them. For people and judges,
+/// on topics of its own: `~truth` (tunnel_pilot/SimulatorTruth), `~walls` and
 /// `~obstacles` (visualization_msgs/Marker in map), TF map -> odom (from `odom` and the truth, as a
-/// localisation would). Services ~reset (std_srvs/Trigger: the truck back to its start, at rest; time goes
-/// on) and ~pause (std_srvs/SetBool: time stands still). Contacts of either body are logged and counted.
+/// localisation would). Services ~reset (std_srvs/Trigger: the truck back to its start, at rest; time
+/// goes on) and ~pause (std_srvs/SetBool: time stands still). Contacts of either body are logged and
+/// counted.
 ///
 /// Lockstep: after each scan time stands still until `command` carries the scan's stamp, and at each
 /// 20 ms until the bridge has sent its frame, but at most 50 ms of steady time, which counts as a miss.
@@ -44,8 +45,8 @@ class Pace {
 /// no faster than real time. `real_time_factor` holds it back; 0 runs as fast as the pilot answers.
 ///
 /// Parameters: config/simulator.yaml, and `truck_file`, `truck_controller_file`, `world_file` (paths),
-/// `bus` (name of the embedded bus), `load` (empty, loaded), `seed`, `reversed` (true: the other way round),
-/// `real_time_factor`. Throws config::ConfigError.
+/// `bus` (name of the embedded bus), `load` (empty, loaded), `seed`, `reversed` (true: the other way
+/// round), `real_time_factor`. Throws config::ConfigError.
 class SimulatorRos {
  public:
   SimulatorRos(ros::NodeHandle nh, ros::NodeHandle private_nh);
@@ -82,12 +83,12 @@ class SimulatorRos {
   ros::CallbackQueue queue_;
   std::unique_ptr<BusTap> bus_;
   std::unique_ptr<simulation::Simulator> simulator_;
-  double scan_period_ = 0.0;       // [s]
+  double scan_period_ = 0.0;  // [s]
   double real_time_factor_ = 1.0;
   bool paused_ = false;
   Pace pace_;
   Lockstep command_lockstep_, bridge_lockstep_;
-  Stamp command_stamp_{};          // of the newest `command`
+  Stamp command_stamp_{};            // of the newest `command`
   std::uint64_t bridge_frames_ = 0;  // at the last wait
   drivers::MotionHistory true_motion_;
 

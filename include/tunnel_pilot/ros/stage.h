@@ -1,11 +1,11 @@
 #pragma once
 
+#include <nodelet/nodelet.h>
+#include <ros/ros.h>
+
 #include <exception>
 #include <memory>
 #include <string>
-
-#include <nodelet/nodelet.h>
-#include <ros/ros.h>
 
 namespace tunnel_pilot::shell {
 

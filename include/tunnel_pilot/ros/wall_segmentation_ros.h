@@ -9,9 +9,9 @@
 namespace tunnel_pilot::shell {
 
 /// Shell of perception::WallSegmentation. Subscribes `points` (sensor_msgs/PointCloud2 in base_link),
-/// publishes `walls` (tunnel_pilot/Walls) with the cloud's stamp for every cloud, found or not. A cloud in
-/// another frame or without x, y, z is refused, logged, counted and told on /diagnostics.
-/// Parameters: config/wall_segmentation.yaml. Throws config::ConfigError.
+/// publishes `walls` (tunnel_pilot/Walls) with the cloud's stamp for every cloud, found or not. A cloud
+/// in another frame or without x, y, z is refused, logged, counted and told on /diagnostics. Parameters:
+/// config/wall_segmentation.yaml. Throws config::ConfigError.
 class WallSegmentationRos {
  public:
   WallSegmentationRos(ros::NodeHandle nh, ros::NodeHandle private_nh);

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "tunnel_pilot/simulation/pilot.h"
@@ -22,6 +23,10 @@ struct Setup {
 
 /// Throws config::ConfigError.
 Setup loadSetup(const Scenario& scenario);
+
+/// The plant that a seed drives: with its own parameters where the scenario varies them, and its own road.
+std::unique_ptr<vehicle::Plant> makePlant(const PlantChoice& choice, const vehicle::TruckParameters& truck,
+                                          std::uint64_t seed);
 
 /// One seed of a scenario, once along its way.
 struct EpisodePlan {

@@ -1,9 +1,9 @@
 #include "tunnel_pilot/ros/lap_monitor.h"
 
+#include <ros/ros.h>
+
 #include <cstdio>
 #include <exception>
-
-#include <ros/ros.h>
 
 // Exit status 0: the lap passed. 1: it failed, or the parameters were refused.
 int main(int argc, char** argv) {

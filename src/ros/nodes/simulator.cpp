@@ -1,8 +1,8 @@
-#include "tunnel_pilot/ros/simulator_ros.h"
+#include <ros/ros.h>
 
 #include <exception>
 
-#include <ros/ros.h>
+#include "tunnel_pilot/ros/simulator_ros.h"
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "simulator");
