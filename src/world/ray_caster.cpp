@@ -390,6 +390,9 @@ void RayCaster::cast(const Pose& sensor, float* ranges, int first, int last) con
     throw std::invalid_argument("beams [" + std::to_string(first) + ", " + std::to_string(last) +
                                 ") are not of this scan");
   }
+  if (!std::isfinite(sensor.x) || !std::isfinite(sensor.y) || !std::isfinite(sensor.heading)) {
+    throw std::invalid_argument("the sensor's pose is not finite");
+  }
   if (first == last) return;
   alignas(32) std::array<float, kMaxBeams> inverse;
   std::fill(&inverse[static_cast<std::size_t>(first)], &inverse[static_cast<std::size_t>(last)], 0.0F);

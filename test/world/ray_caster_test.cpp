@@ -289,6 +289,13 @@ TEST(RayCaster, BeamsOutsideTheScanAreRefused) {
   EXPECT_THROW(caster.cast({}, ranges.data(), 6, 5), std::invalid_argument);
 }
 
+TEST(RayCaster, PosesThatAreNotFiniteAreRefused) {
+  const RayCaster caster(kRoom, kScan);
+  std::vector<float> ranges;
+  EXPECT_THROW(caster.cast({NAN, 0.0, 0.0}, ranges), std::invalid_argument);
+  EXPECT_THROW(caster.cast({0.0, 0.0, INFINITY}, ranges), std::invalid_argument);
+}
+
 TEST(RayCaster, WallsThatAreNotFiniteAreRefused) {
   EXPECT_THROW(RayCaster({{{0.0, 0.0}, {NAN, 1.0}}}, kScan), std::invalid_argument);
 }

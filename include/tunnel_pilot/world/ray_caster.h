@@ -11,11 +11,11 @@ namespace tunnel_pilot::world {
 /// Exact ranges from a planar sensor to walls and obstacle outlines (no grid): within 2 mm of the
 /// intersections computed in double. Beam i points to angle_min + i * angle_increment in the sensor's
 /// frame. Chains that share a vertex let no beam through between them. Casting from several threads at
-/// once is safe; setMovingChains() beside it is not. Throws std::invalid_argument for beams that span more
-/// than a full turn, more than 16384 beams, vertices that are not finite, and beams outside the scan.
+/// once is safe; setMovingChains() beside it is not. Throws std::invalid_argument for beams that span
+/// more than a full turn, more than 16384 beams, beams outside the scan, and what is not finite.
 ///
-/// A segment from p to p + e meets the beam of direction d at range r = (p x e) / (d x e); so 1/r is linear
-/// in d, and the nearest of many segments has the greatest 1/r.
+/// A segment from p to p + e meets the beam of direction d at range r = (p x e) / (d x e); so 1/r is
+/// linear in d, and the nearest of many segments has the greatest 1/r.
 class RayCaster {
  public:
   struct Beams {
