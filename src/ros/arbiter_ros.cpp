@@ -40,6 +40,7 @@ template <class Message, class Callback>
 void ArbiterRos::listen(ros::NodeHandle& nh, const std::string& topic, Callback callback) {
   const boost::function<void(const boost::shared_ptr<const Message>&)> call =
       [this, callback](const boost::shared_ptr<const Message>& message) {
+        nowAfter(message->header.stamp);
         checkClock();
         callback(*message);
       };

@@ -69,6 +69,13 @@ ros::Time toRos(Stamp stamp) {
 
 Stamp now() { return toCore(ros::Time::now()); }
 
+Stamp nowAfter(const ros::Time& stamp) {
+  if (!ros::Time::isSimTime()) return now();
+  const ros::SteadyTime end = ros::SteadyTime::now() + ros::WallDuration(0.05);
+  while (ros::Time::now() < stamp && ros::SteadyTime::now() < end) ros::WallDuration(0.0002).sleep();
+  return now();
+}
+
 geometry::Pose toCore(const geometry_msgs::Pose& pose) {
   const auto& q = pose.orientation;
   const double heading = std::atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z));

@@ -58,7 +58,7 @@ void PreviewDriverRos::propose() {
     ROS_WARN_THROTTLE(1.0, "preview_driver: %s", problem_.c_str());
     return;
   }
-  const auto proposal = driver_.propose(*tunnel, *motion, now());
+  const auto proposal = driver_.propose(*tunnel, *motion, nowAfter(toRos(motion->stamp)));
   problem_ = proposal.valid ? "" : "no valid proposal: " + toString(tunnel->state.reason);
   publisher_.publish(boost::make_shared<Proposal>(toRos(proposal)));
 }

@@ -20,6 +20,7 @@ ScanFilterRos::ScanFilterRos(ros::NodeHandle nh, ros::NodeHandle private_nh)
       diagnostics_(nh, private_nh, "scan_filter", [this](auto& status) { fillStatus(status); }) {}
 
 void ScanFilterRos::onScan(const sensor_msgs::LaserScan& message) {
+  const Stamp received = nowAfter(message.header.stamp);
   if (clock_.jumped()) {
     ROS_WARN("scan_filter: the clock jumped, starting anew");
     filter_.reset();
@@ -30,7 +31,7 @@ void ScanFilterRos::onScan(const sensor_msgs::LaserScan& message) {
     ROS_ERROR_THROTTLE(1.0, "scan_filter: %s", problem_.c_str());
     return;
   }
-  const auto& result = filter_.filter(toCore(message), *sensor, now());
+  const auto& result = filter_.filter(toCore(message), *sensor, received);
   if (result.accepted) {
     problem_.clear();
     publish(result, message);

@@ -19,7 +19,7 @@ namespace {
 constexpr Stamp kClockPeriod = std::chrono::milliseconds(10);
 constexpr Stamp kFramePeriod = std::chrono::milliseconds(20);
 constexpr Stamp kObstaclePeriod = std::chrono::milliseconds(200);
-constexpr double kLongestWait = 0.05;  // [s] steady time
+constexpr double kLongestWait = 0.25;  // [s] steady time
 constexpr double kWallHeight = 1.5;    // of the pictured walls [m]
 
 // True when the step from `before` to `now` reached another multiple of the period.

@@ -36,6 +36,10 @@ ros::Time toRos(Stamp stamp);
 /// ROS time now, as the core takes it.
 Stamp now();
 
+/// The same, on receipt of a message that was stamped then. In simulated time a message may overtake the
+/// clock, which comes over another connection: it is waited for, at most 50 ms of steady time.
+Stamp nowAfter(const ros::Time& stamp);
+
 geometry::Pose toCore(const geometry_msgs::Pose& pose);
 geometry_msgs::Pose toRos(const geometry::Pose& pose);
 

@@ -40,7 +40,7 @@ class Pace {
 /// counted.
 ///
 /// Lockstep: after each scan time stands still until `command` carries the scan's stamp, and at each
-/// 20 ms until the bridge has sent its frame, but at most 50 ms of steady time, which counts as a miss.
+/// 20 ms until the bridge has sent its frame, but at most 0.25 s of steady time, which counts as a miss.
 /// After kMissesAllowed misses in a row, and before the pilot's first answer, it does not wait and runs
 /// no faster than real time. `real_time_factor` holds it back; 0 runs as fast as the pilot answers.
 ///
