@@ -1,0 +1,111 @@
+#include <fstream>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "program.h"
+
+namespace tunnel_pilot {
+namespace {
+
+const std::string kPackage = TUNNEL_PILOT_SOURCE_DIR;
+
+Outcome evaluate(const std::vector<std::string>& arguments) {
+  return runProgram(EVALUATE_PROGRAM, arguments);
+}
+
+// The kinematic truck's return, short: a closed loop of a second or two.
+std::string shortDrive(const std::string& goal) {
+  return "name: short\ntitle: A short drive\nconfig: " + kPackage +
+         "/config\nfirst_seed: 1000\nseeds: 3\n"
+         "plant: {model: dynamic, load: loaded, rough_road: true, variation: 0.1}\n"
+         "experiment:\n  kind: drive\n  world: " +
+         kPackage +
+         "/worlds/straight_8m.yaml\n  both_directions: true\n  station: 20.0\n  lateral_offset: 0.0\n"
+         "  heading_error: 0.0\n  rolling_speed: 0.0\n  top_speed: 3.0\n  distance: 15.0\n"
+         "  time_limit: 30.0\n  return_metrics: false\ngoals:\n  - " +
+         goal + "\n";
+}
+
+class Evaluate : public ::testing::Test {
+ protected:
+  std::string scenario(const std::string& goal) {
+    std::ofstream(place_.file("short.yaml")) << shortDrive(goal);
+    return place_.file("short.yaml");
+  }
+  Workplace place_;
+};
+
+TEST_F(Evaluate, ExitsZeroWhenEveryGoalHolds) {
+  const Outcome outcome =
+      evaluate({scenario("{metric: completed, paper: '-', judge: every_seed, min: 1.0}")});
+  EXPECT_EQ(outcome.status, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("Every goal holds"), std::string::npos);
+  EXPECT_NE(outcome.output.find("6 episodes"), std::string::npos) << "three seeds, both directions";
+}
+
+TEST_F(Evaluate, ExitsOneWhenAGoalIsMissed) {
+  const Outcome outcome =
+      evaluate({scenario("{metric: speed_mean, paper: '-', judge: every_seed, min: 100.0}")});
+  EXPECT_EQ(outcome.status, 1) << outcome.output;
+  EXPECT_NE(outcome.output.find("MISSED"), std::string::npos);
+}
+
+TEST_F(Evaluate, SameScenarioAndSeedsGiveTheSameBytesOnAnyNumberOfThreads) {
+  const std::string file = scenario("{metric: lateral_rms, paper: '-', judge: every_seed, max: 9.0}");
+  for (const auto& [folder, jobs] : {std::pair{"a", "1"}, std::pair{"b", "1"}, std::pair{"c", "2"}}) {
+    ASSERT_EQ(evaluate({file, "--seeds", "2", "--out", place_.file(folder), "--jobs", jobs}).status, 0);
+  }
+  const auto first = contentsBelow(place_.file("a"));
+  EXPECT_EQ(first, contentsBelow(place_.file("b")));
+  EXPECT_EQ(first, contentsBelow(place_.file("c")));
+  EXPECT_EQ(first.count("short/summary.json"), 1u);
+  EXPECT_EQ(first.count("short/episodes.csv"), 1u);
+  EXPECT_EQ(first.count("short/seed_1000.csv"), 1u);
+  EXPECT_EQ(first.count("short/seed_1001_reversed_perception.csv"), 1u);
+  int pictures = 0;
+  for (const auto& [name, content] : first) pictures += name.find(".png") != std::string::npos ? 1 : 0;
+  EXPECT_EQ(pictures, 2) << "the median and the worst episode";
+}
+
+TEST_F(Evaluate, SummaryIsJsonWithTheFingerprintsOfWhatWasRun) {
+  const std::string file = scenario("{metric: lateral_rms, paper: '-', judge: every_seed, max: 9.0}");
+  ASSERT_EQ(evaluate({file, "--seeds", "1", "--out", place_.file("a")}).status, 0);
+  const auto json = nlohmann::json::parse(contentOf(place_.file("a/short/summary.json")));
+  EXPECT_TRUE(json.at("passed").get<bool>());
+  for (const char* part : {"scenario", "controller", "plant", "world"}) {
+    EXPECT_EQ(json.at("sha256").at(part).get<std::string>().size(), 64u) << part;
+  }
+  EXPECT_EQ(json.at("episodes").size(), 2u);
+}
+
+TEST_F(Evaluate, BadInputExitsTwoAndSaysWhy) {
+  const std::string good = scenario("{metric: completed, paper: '-', judge: every_seed, min: 1.0}");
+  const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
+      {{}, "scenario"},
+      {{"nowhere.yaml"}, "nowhere.yaml"},
+      {{good, "--seeds", "0"}, "--seeds"},
+      {{good, "--seeds", "many"}, "seeds"},
+      {{good, "--jobs", "0"}, "--jobs"},
+      {{good, "--colour", "red"}, "colour"},
+      {{good, "--config", place_.file("none")}, "none"},
+      {{good, "--seeds", "1", "--out", "/dev/null/out"}, "/dev/null/out"},
+      {{kPackage + "/config/truck.yaml"}, "truck.yaml"},
+  };
+  for (const auto& [arguments, told] : cases) {
+    const Outcome outcome = evaluate(arguments);
+    EXPECT_EQ(outcome.status, 2) << outcome.output;
+    EXPECT_NE(outcome.output.find(told), std::string::npos) << outcome.output;
+  }
+}
+
+TEST_F(Evaluate, HelpExplainsItsOptions) {
+  const Outcome outcome = evaluate({"--help"});
+  EXPECT_EQ(outcome.status, 0);
+  for (const char* option : {"--seeds", "--out", "--jobs", "--config", "Exit status"}) {
+    EXPECT_NE(outcome.output.find(option), std::string::npos) << option;
+  }
+}
+
+}  // namespace
+}  // namespace tunnel_pilot
