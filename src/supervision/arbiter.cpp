@@ -85,6 +85,7 @@ void Arbiter::setTruckState(const TruckState& state, Stamp now) {
   truck_state_ = state;
   truck_state_received_ = now;
   const bool at_rest = !state.engaged && !state.stopping;
+  standby_seen_ = standby_seen_ || at_rest;
   if (at_rest && latched_ && age(latched_at_, now) > parameters_.recovery_time) latched_.reset();
 }
 
@@ -181,6 +182,8 @@ void Arbiter::assessMotion(Stamp now, Findings& findings) const {
 void Arbiter::assessTruck(Stamp now, Findings& findings) const {
   if (!parameters_.needs_truck_state) return;
   if (!truck_state_received_) return findings.stopFor(Reason::kStartUp);
+  // An arbiter that comes up behind a truck already under way has not seen it engage.
+  if (truck_state_.engaged && !standby_seen_) findings.stopFor(Reason::kStartUp);
   if (truck_state_.stopping) findings.stopFor(truck_state_.reason);
   if (age(truck_state_received_, now) > parameters_.truck_state_stop_age) {
     findings.stopFor(Reason::kFeedbackStale);

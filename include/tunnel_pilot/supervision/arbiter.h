@@ -194,6 +194,7 @@ class Arbiter {
   bool motion_finite_ = true;
   TruckState truck_state_;
   std::optional<Stamp> truck_state_received_;
+  bool standby_seen_ = false;  ///< the truck was neither engaged nor stopping once
 
   std::optional<Stamp> corridor_stamp_;  ///< of the scan last compared
   double driven_since_corridor_ = 0.0;   ///< [m]

@@ -1,0 +1,184 @@
+#include "tunnel_pilot/supervision/command_limiter.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "tunnel_pilot/vehicle/articulation.h"
+
+namespace tunnel_pilot::supervision {
+namespace {
+
+constexpr double kCycle = 0.02;  // [s]
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr CommandLimiterParameters kLimits{0.75, 0.26, 2.0, 9.7, 0.8, 1.2, 3.0, 2.5};
+
+vehicle::TruckGeometry truck() {
+  static const vehicle::TruckGeometry geometry =
+      vehicle::loadTruck(std::string(TUNNEL_PILOT_SOURCE_DIR) + "/config/truck.yaml").geometry;
+  return geometry;
+}
+
+CommandLimiter at(double articulation, double speed) {
+  CommandLimiter limiter(kLimits, truck());
+  limiter.start(articulation, speed);
+  return limiter;
+}
+
+double lateralAcceleration(double speed, double articulation) {
+  return speed * speed * std::abs(vehicle::steadyCurvature(truck(), articulation));
+}
+
+bool any(const CommandLimiter::Flags& f) {
+  return f.not_finite || f.angle || f.lateral_acceleration || f.rate || f.speed || f.acceleration ||
+         f.jerk;
+}
+
+TEST(CommandLimiter, InsideAllLimitsEverythingPassesUntouched) {
+  CommandLimiter limiter = at(0.1, 2.0);
+  const CommandLimiter::Result result = limiter.limit({0.104, 2.0005, 2.0, false}, kCycle);
+  EXPECT_EQ(result.articulation, 0.104);
+  EXPECT_DOUBLE_EQ(result.speed, 2.0005);
+  EXPECT_FALSE(any(result.fired));
+}
+
+TEST(CommandLimiter, ASteadyRequestStaysUntouched) {
+  CommandLimiter limiter = at(0.1, 2.0);
+  for (int i = 0; i < 100; ++i) {
+    const CommandLimiter::Result result = limiter.limit({0.1, 2.0, 2.0, false}, kCycle);
+    EXPECT_EQ(result.articulation, 0.1);
+    EXPECT_EQ(result.speed, 2.0);
+    EXPECT_FALSE(any(result.fired));
+  }
+}
+
+TEST(CommandLimiter, AngleIsLimitedAndFlagged) {
+  CommandLimiter limiter = at(0.749, 0.0);
+  const CommandLimiter::Result result = limiter.limit({0.9, 0.0, 0.0, false}, kCycle);
+  EXPECT_DOUBLE_EQ(result.articulation, 0.75);
+  EXPECT_TRUE(result.fired.angle);
+}
+
+TEST(CommandLimiter, RateIsLimitedAndFlagged) {
+  CommandLimiter limiter = at(0.0, 0.0);
+  const CommandLimiter::Result result = limiter.limit({0.5, 0.0, 0.0, false}, kCycle);
+  EXPECT_DOUBLE_EQ(result.articulation, 0.26 * kCycle);
+  EXPECT_TRUE(result.fired.rate);
+  EXPECT_FALSE(result.fired.angle);
+}
+
+TEST(CommandLimiter, ARateJustInsideIsNotFlagged) {
+  CommandLimiter limiter = at(0.0, 0.0);
+  EXPECT_FALSE(limiter.limit({0.259 * kCycle, 0.0, 0.0, false}, kCycle).fired.rate);
+}
+
+TEST(CommandLimiter, LateralAccelerationIsLimitedWithTheHigherOfBothSpeeds) {
+  // 8 m/s allow 2/64 1/m.
+  const double widest = vehicle::steadyArticulation(truck(), 2.0 / 64.0);
+  CommandLimiter measured_fast = at(widest, 2.0);
+  EXPECT_TRUE(measured_fast.limit({widest + 0.004, 2.0, 8.0, false}, kCycle).fired.lateral_acceleration);
+  CommandLimiter commanded_fast = at(widest, 8.0);
+  EXPECT_TRUE(
+      commanded_fast.limit({widest + 0.004, 8.0, 2.0, false}, kCycle).fired.lateral_acceleration);
+  CommandLimiter slow = at(widest, 2.0);
+  EXPECT_FALSE(slow.limit({widest + 0.004, 2.0, 2.0, false}, kCycle).fired.lateral_acceleration);
+}
+
+TEST(CommandLimiter, SpeedIsLoweredForTheBendThatIsAlreadySteered) {
+  CommandLimiter limiter = at(0.5, 3.0);
+  CommandLimiter::Result result;
+  for (int i = 0; i < 500; ++i) result = limiter.limit({0.5, 9.0, 0.0, false}, kCycle);
+  EXPECT_LE(lateralAcceleration(result.speed, result.articulation), 2.0 + 1e-9);
+}
+
+TEST(CommandLimiter, AccelerationAndJerkAreLimitedOnTheWayUp) {
+  CommandLimiter limiter = at(0.0, 0.0);
+  double speed = 0.0;
+  double acceleration = 0.0;
+  for (int i = 0; i < 600; ++i) {
+    const double next = limiter.limit({0.0, 5.0, speed, false}, kCycle).speed;
+    const double now = (next - speed) / kCycle;
+    EXPECT_LE(now, 0.8 + 1e-9);
+    EXPECT_LE(std::abs(now - acceleration), 3.0 * kCycle + 1e-9);
+    acceleration = now;
+    speed = next;
+  }
+  EXPECT_NEAR(speed, 5.0, 1e-6);
+}
+
+TEST(CommandLimiter, SpeedLandsWithoutOvershoot) {
+  CommandLimiter limiter = at(0.0, 0.0);
+  for (int i = 0; i < 600; ++i)
+    EXPECT_LE(limiter.limit({0.0, 3.0, 0.0, false}, kCycle).speed, 3.0 + 1e-9);
+}
+
+TEST(CommandLimiter, AStopAsksForNoSpeedAtOnceAndStillSteersWithinTheRate) {
+  CommandLimiter limiter = at(0.2, 3.0);
+  const CommandLimiter::Result result = limiter.limit({0.5, 3.0, 3.0, true}, kCycle);
+  EXPECT_EQ(result.speed, 0.0);
+  EXPECT_EQ(result.acceleration, kLimits.stop_deceleration);
+  EXPECT_DOUBLE_EQ(result.articulation, 0.2 + 0.26 * kCycle);
+}
+
+TEST(CommandLimiter, AnAngleThatIsNoNumberHoldsTheLast) {
+  CommandLimiter limiter = at(0.2, 1.0);
+  for (const double bad : {kNaN, std::numeric_limits<double>::infinity()}) {
+    const CommandLimiter::Result result = limiter.limit({bad, 1.0, 1.0, false}, kCycle);
+    EXPECT_EQ(result.articulation, 0.2);
+    EXPECT_TRUE(result.fired.not_finite);
+  }
+}
+
+TEST(CommandLimiter, ASpeedThatIsNoNumberSlowsDown) {
+  CommandLimiter limiter = at(0.0, 2.0);
+  CommandLimiter::Result result;
+  for (int i = 0; i < 200; ++i) result = limiter.limit({0.0, kNaN, 2.0, false}, kCycle);
+  EXPECT_NEAR(result.speed, 0.0, 1e-6);
+}
+
+TEST(CommandLimiter, APauseAllowsNoLargeStep) {
+  CommandLimiter limiter = at(0.0, 0.0);
+  EXPECT_LE(limiter.limit({0.7, 0.0, 0.0, false}, 10.0).articulation, 0.26 * 0.1 + 1e-12);
+}
+
+// Whatever is asked, measured and however long it took.
+TEST(CommandLimiter, NoLimitIsEverExceeded) {
+  std::mt19937 engine(7);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  const auto wild = [&](double scale) {
+    const double u = uniform(engine);
+    if (u > 0.97) return kNaN;
+    if (u < -0.97) return std::numeric_limits<double>::infinity() * uniform(engine);
+    return scale * uniform(engine);
+  };
+  CommandLimiter limiter = at(0.0, 0.0);
+  double angle = 0.0;
+  double speed = 0.0;
+  for (int i = 0; i < 20000; ++i) {
+    const double elapsed = i % 50 == 0 ? wild(1.0) : 0.05 * std::abs(uniform(engine));
+    const double counted = std::isfinite(elapsed) ? std::clamp(elapsed, 0.0, 0.1) : 0.0;
+    const double measured = wild(12.0);
+    const CommandLimiter::Result result =
+        limiter.limit({wild(1.5), wild(15.0), measured, uniform(engine) > 0.95}, elapsed);
+    ASSERT_TRUE(std::isfinite(result.articulation) && std::isfinite(result.speed));
+    ASSERT_LE(std::abs(result.articulation), kLimits.max_articulation);
+    ASSERT_LE(std::abs(result.articulation - angle), kLimits.max_articulation_rate * counted + 1e-12);
+    ASSERT_GE(result.speed, 0.0);
+    ASSERT_LE(result.speed, kLimits.max_speed);
+    ASSERT_LE(result.speed - speed, kLimits.max_acceleration * counted + 1e-12);
+    // Lateral acceleration is within its limit, or on its way there as fast as rate and braking allow.
+    const double fastest = std::max(std::isfinite(measured) ? std::abs(measured) : 0.0, result.speed);
+    if (lateralAcceleration(fastest, result.articulation) > kLimits.max_lateral_acceleration + 1e-9) {
+      ASSERT_TRUE(result.fired.not_finite || result.fired.lateral_acceleration || result.fired.rate ||
+                  std::abs(result.articulation) <= std::abs(angle) + 1e-12)
+          << i;
+    }
+    angle = result.articulation;
+    speed = result.speed;
+  }
+}
+
+}  // namespace
+}  // namespace tunnel_pilot::supervision

@@ -1,0 +1,184 @@
+#include "tunnel_pilot/supervision/envelope.h"
+
+#include <gtest/gtest.h>
+
+#include "drift_scene.h"
+
+namespace tunnel_pilot::supervision {
+namespace {
+
+const std::string kConfig = std::string(TUNNEL_PILOT_SOURCE_DIR) + "/config/";
+constexpr double kHalfTruck = 1.525;  // [m]
+
+// One scan of a scene, the truck where the scan saw it.
+struct Check {
+  vehicle::TruckGeometry truck = vehicle::loadTruck(kConfig + "truck.yaml").geometry;
+  ArbiterParameters parameters = loadArbiter(config::loadFile(kConfig + "arbiter.yaml"));
+  Envelope envelope{parameters.envelope, parameters.limiter, truck};
+  double speed = 3.0;
+  double articulation = 0.0;
+  double commanded = 0.0;
+  geometry::Pose odom;
+
+  const Envelope::Result& of(const Scene& scene) {
+    drivers::ArticulationProfile profile;
+    profile.build(scene.tunnel.centerline, truck, 0.5);
+    std::vector<geometry::Point> points;
+    for (const TestPoint& p : scene.points) points.emplace_back(p.x, p.y);
+    return envelope.update({scene.walls,
+                            points,
+                            scene.tunnel.centerline,
+                            profile,
+                            {},
+                            {},
+                            odom,
+                            articulation,
+                            commanded,
+                            speed});
+  }
+};
+
+geometry::Path straight() { return geometry::buildPath({{80.0, 0.0, 0.0}}, {}, 0.5); }
+
+Scene straightScene(double offset, double heading = 0.0, double width = 5.0) {
+  return sceneAt(straight(), {20.0, offset, heading}, width, Stamp(1));
+}
+
+TEST(Envelope, ClearanceInAStraightIsHalfTheDifferenceOfWidths) {
+  Check check;
+  const Envelope::Result& result = check.of(straightScene(0.0));
+  EXPECT_NEAR(result.clearance_left, 2.5 - kHalfTruck, 0.01);
+  EXPECT_NEAR(result.clearance_right, 2.5 - kHalfTruck, 0.01);
+}
+
+TEST(Envelope, AnEccentricTruckIsNearerToItsWall) {
+  Check check;
+  const Envelope::Result& result = check.of(straightScene(0.3));
+  EXPECT_NEAR(result.clearance_left, 2.5 - 0.3 - kHalfTruck, 0.06);
+}
+
+TEST(Envelope, SightEndsTheFreeDistance) {
+  Check check;
+  const Envelope::Result& result = check.of(straightScene(0.0));
+  EXPECT_EQ(result.free_until, Envelope::End::kSight);
+  EXPECT_NEAR(result.free_distance, 15.0 - check.truck.front_overhang, 0.01);
+}
+
+TEST(Envelope, WithoutWallsAndCenterlineNothingIsFree) {
+  Check check;
+  Scene scene;
+  EXPECT_EQ(check.of(scene).free_distance, 0.0);
+  EXPECT_TRUE(std::isnan(check.envelope.result().clearance_left));
+}
+
+TEST(Envelope, BothBodiesSweepInsideAndOutsideInABend) {
+  // Steady on R 12 m the specification's geometry sweeps -1.77...+1.62 m about the front axle's way.
+  Check check;
+  const double k = 1.0 / 12.0;
+  check.articulation = check.commanded = 0.4344;  // steady for R 12 m
+  const geometry::Path bend = geometry::buildPath({{70.0, k, k}}, {}, 0.25);
+  const geometry::PathPoint p = bend.at(20.0);
+  const Envelope::Result& result = check.of(sceneAt(bend, {p.x, p.y, p.heading}, 5.0, Stamp(1)));
+  EXPECT_NEAR(result.clearance_left, 2.5 - 1.77, 0.06);
+  EXPECT_NEAR(result.clearance_right, 2.5 - 1.62, 0.06);
+}
+
+TEST(Envelope, ATooNarrowPlaceEndsTheFreeDistanceAtTheWall) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  for (auto& p : scene.walls.left.curve) {
+    if (p.x() > 9.0) p.y() -= 0.9;
+  }
+  const Envelope::Result& result = check.of(scene);
+  EXPECT_EQ(result.free_until, Envelope::End::kWall);
+  EXPECT_NEAR(result.free_distance, 9.0 - check.truck.front_overhang, 1.0);
+}
+
+TEST(Envelope, TheSmallestObstacleIsFoundAnywhereInTheCorridor) {
+  for (const double x : {4.0, 7.0, 11.0}) {
+    for (const double y : {-1.4, 0.0, 1.4}) {
+      Check check;
+      Scene scene = straightScene(0.0);
+      addObstacle(scene, x, y, check.parameters.envelope.smallest_obstacle);
+      const Envelope::Result& result = check.of(scene);
+      EXPECT_EQ(result.free_until, Envelope::End::kObstacle) << x << " " << y;
+      EXPECT_NEAR(result.free_distance, x - check.truck.front_overhang, 0.05);
+    }
+  }
+}
+
+TEST(Envelope, AnObstacleBesideTheCorridorIsNone) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  addObstacle(scene, 7.0, 2.15, 0.4);
+  EXPECT_EQ(check.of(scene).free_until, Envelope::End::kSight);
+}
+
+TEST(Envelope, AnObstacleWithinTheMarginCounts) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  addObstacle(scene, 7.0, kHalfTruck + 0.1, 0.1);
+  scene.points.push_back({7.1, kHalfTruck + 0.1});
+  scene.points.push_back({7.2, kHalfTruck + 0.1});
+  EXPECT_EQ(check.of(scene).free_until, Envelope::End::kObstacle);
+}
+
+TEST(Envelope, LoneDustDoesNotStopTheTruck) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  for (int i = 0; i < 12; ++i) scene.points.push_back({3.0 + i, i % 2 == 0 ? 1.0 : -1.0});
+  EXPECT_EQ(check.of(scene).free_until, Envelope::End::kSight);
+}
+
+TEST(Envelope, ReturnsThatAreNoNumbersAreNoObstacles) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (int i = 0; i < 20; ++i) scene.points.push_back({nan, nan});
+  EXPECT_EQ(check.of(scene).free_until, Envelope::End::kSight);
+}
+
+TEST(Envelope, ACommandIntoTheWallIsSeenBeforeItHappens) {
+  Check check;
+  check.commanded = 0.6;
+  check.speed = 5.0;
+  const double away = check.of(straightScene(0.0)).clearance_left;
+  check.commanded = 0.0;
+  EXPECT_LT(away, check.of(straightScene(0.0)).clearance_left - 0.3);
+}
+
+TEST(Envelope, RemembersTheWallsBesideTheTruck) {
+  // The wall comes nearer beside the rear body, where the lidar at the nose no longer looks.
+  Check check;
+  for (double x = 0.0; x <= 8.0; x += 0.25) {
+    check.odom = {x, 0.0, 0.0};
+    Scene scene = straightScene(0.0);
+    for (auto& p : scene.walls.left.curve) {
+      if (x + p.x() > 4.0 && x + p.x() < 6.0) p.y() -= 0.5;
+    }
+    check.of(scene);
+  }
+  EXPECT_NEAR(check.envelope.result().clearance_left, 2.5 - 0.5 - kHalfTruck, 0.05);
+  check.envelope.reset();
+  EXPECT_NEAR(check.of(straightScene(0.0)).clearance_left, 2.5 - kHalfTruck, 0.01);
+}
+
+TEST(Envelope, TheCorridorIsDrawnFromTailToFront) {
+  Check check;
+  const Envelope::Result& result = check.of(straightScene(0.0));
+  ASSERT_EQ(result.corridor_left.size(), result.corridor_right.size());
+  ASSERT_GT(result.corridor_left.size(), 10u);
+  EXPECT_LT(result.corridor_left.front().x(), -5.0);
+  EXPECT_GT(result.corridor_left.back().x(), 6.0);
+  EXPECT_NEAR(result.corridor_left.back().y(), kHalfTruck, 0.02);
+  EXPECT_NEAR(result.corridor_right.back().y(), -kHalfTruck, 0.02);
+}
+
+TEST(Envelope, StoppingDistanceIsReactionAndBraking) {
+  Check check;
+  const auto& p = check.parameters.envelope;
+  EXPECT_DOUBLE_EQ(check.envelope.stoppingDistance(4.0), 4.0 * p.reaction_time + 8.0 / p.deceleration);
+}
+
+}  // namespace
+}  // namespace tunnel_pilot::supervision
