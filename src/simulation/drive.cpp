@@ -37,8 +37,9 @@ class Drive : public ClosedLoop {
   void takeScan(const geometry::Scan& scan) override {
     pilot_.takeScan(scan, simulator_.now());
     if (!driving_) return;
+    const Truth& truth = simulator_.truthOfScan();
     perception_.push_back(
-        comparePerception(pilot_.tunnel().state, simulator_.truthOfScan(), simulator_.world().width));
+        comparePerception(pilot_.tunnel().state, truth, simulator_.world().widthAt(truth.station)));
   }
 
   std::string driveOn() {

@@ -125,8 +125,8 @@ EpisodeResult runPerception(const PerceptionExperiment& experiment, const Scenar
     const geometry::Pose odom = odometry.update(moved, i == 0 ? 0.0 : period);
     const perception::Tunnel* tunnel =
         chain.update(scan, sensor, odom, stamp + fromSeconds(setup.simulator.lidar.latency));
-    result.perception.push_back(
-        comparePerception(tunnel != nullptr ? tunnel->state : perception::TunnelState{}, truth, world.width));
+    const perception::TunnelState state = tunnel != nullptr ? tunnel->state : perception::TunnelState{};
+    result.perception.push_back(comparePerception(state, truth, world.widthAt(truth.station)));
     const double way = std::hypot(moved.x, moved.y);
     if (way > 0.0) articulation += way * vehicle::articulationSlope(truck, moved.heading / way, articulation);
     result.track.push_back(trackSample(truth, truck, period * i, articulation, experiment.speed));

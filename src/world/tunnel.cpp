@@ -51,15 +51,7 @@ class WallBuilder {
   }
 
  private:
-  double halfWidth(double s) const {
-    double width = plan_.width;
-    for (const Widening& w : plan_.widenings) {
-      if (s <= w.from || s >= w.to) continue;
-      const double share = std::min({1.0, (s - w.from) / w.taper, (w.to - s) / w.taper});
-      width += share * (w.width - plan_.width);
-    }
-    return 0.5 * width;
-  }
+  double halfWidth(double s) const { return 0.5 * widthAt(plan_, s); }
 
   TaggedChain wall(bool left) const {
     const double side = left ? 1.0 : -1.0;
@@ -161,6 +153,16 @@ class WallBuilder {
 };
 
 }  // namespace
+
+double widthAt(const TunnelPlan& plan, double s) {
+  double width = plan.width;
+  for (const Widening& w : plan.widenings) {
+    if (s <= w.from || s >= w.to) continue;
+    const double share = std::min({1.0, (s - w.from) / w.taper, (w.to - s) / w.taper});
+    width += share * (w.width - plan.width);
+  }
+  return width;
+}
 
 TunnelWalls buildWalls(const TunnelPlan& plan) { return WallBuilder(plan).build(); }
 

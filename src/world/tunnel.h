@@ -52,6 +52,9 @@ struct TunnelWalls {
 };
 TunnelWalls buildWalls(const TunnelPlan& plan);
 
+/// Distance between the walls at arc length `s` [m]: the plan's width and its widenings.
+double widthAt(const TunnelPlan& plan, double s);
+
 /// Random numbers that are the same with every standard library.
 class Draws {
  public:

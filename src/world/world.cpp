@@ -161,7 +161,11 @@ World loadTunnel(Node& node, const WorldOptions& options, bool random) {
   world.width = plan.width;
   world.design_line = geometry::buildPath(plan.pieces, {}, kLineSpacing, plan.closed);
   world.obstacles = readObstacles(node, world.design_line);
-  if (options.reversed) world.design_line = reversedLine(world.design_line);
+  for (const PathPoint& p : world.design_line.points()) world.widths.push_back(widthAt(plan, p.s));
+  if (options.reversed) {
+    world.design_line = reversedLine(world.design_line);
+    std::reverse(world.widths.begin(), world.widths.end());
+  }
   const PathPoint p =
       world.design_line.at(node.number("start_at", "m", 0.0, world.design_line.length()));
   world.start = {p.x, p.y, geometry::wrapAngle(p.heading)};
@@ -241,6 +245,17 @@ WallChain Obstacle::chainAt(double time) const {
   for (const Point& p : outline) chain.push_back(pose.transform(p));
   if (!chain.empty()) chain.push_back(chain.front());
   return chain;
+}
+
+double World::widthAt(double s) const {
+  if (widths.empty()) return width;
+  const auto& points = design_line.points();
+  const double station = design_line.at(s).s;
+  const auto after = std::upper_bound(points.begin() + 1, points.end() - 1, station,
+                                      [](double value, const PathPoint& p) { return value < p.s; });
+  const auto i = static_cast<std::size_t>(after - points.begin());
+  const double t = (station - points[i - 1].s) / (points[i].s - points[i - 1].s);
+  return widths[i - 1] + t * (widths[i] - widths[i - 1]);
 }
 
 World loadWorld(const std::string& file, const WorldOptions& options) {

@@ -130,6 +130,16 @@ TEST(Tunnel, WideningMovesBothWallsAndTapers) {
   EXPECT_NEAR(wallsAt(world, 65.0).second, 2.5, 0.01);
 }
 
+TEST(Tunnel, WidthAlongTheLineKnowsWideningsBothWaysRound) {
+  const std::string file = kWorlds + "default_drift.yaml";  // 8 m wide from 264 to 296 m, tapers of 6 m
+  const World world = loadWorld(file);
+  const World reversed = loadWorld(file, {std::nullopt, true});
+  for (const auto& [s, width] : {std::pair(100.0, 5.0), std::pair(267.0, 6.5), std::pair(280.0, 8.0)}) {
+    EXPECT_NEAR(world.widthAt(s), width, 0.1) << s;
+    EXPECT_NEAR(reversed.widthAt(world.design_line.length() - s), width, 0.1) << s;
+  }
+}
+
 TEST(Tunnel, OpeningIsOnItsSideAsDeepAndWideAsAsked) {
   const World world =
       loadText(tunnel("  - straight: {length: 80.0}\n",

@@ -34,7 +34,12 @@ struct World {
   std::vector<Obstacle> obstacles;
   geometry::Path design_line;  ///< empty for a map without one
   double width = 0.0;          ///< nominal distance between the walls [m]
+  std::vector<double> widths;  ///< distance between the walls at the design line's points, openings left
+                               ///< out [m]; empty where it is the nominal one throughout
   geometry::Pose start;        ///< where a truck's front axle is put
+
+  /// Distance between the walls beside the design line's station `s` [m], interpolated, without roughness.
+  double widthAt(double s) const;
 };
 
 /// What may be overridden when the same world file is used for many seeds and both ways round.
