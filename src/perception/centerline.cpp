@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Dense>
+#include "arc_length_fit.h"
 
 namespace tunnel_pilot::perception {
 namespace {
@@ -13,6 +13,7 @@ using geometry::Point;
 using geometry::Pose;
 
 constexpr double kSeenComing = 2.5;     // [m] along the tunnel, between a width expected and met
+constexpr double kCurveStep = 0.5;  // [m] between samples of the walls' curves
 constexpr std::size_t kFewestInFit = 4;  // nodes in a parabola's window
 
 bool isFinite(const Pose& pose) {
@@ -27,42 +28,6 @@ Point tangentAt(const std::vector<Point>& curve, std::size_t i) {
 }
 
 Point leftOf(const Point& direction) { return {-direction.y(), direction.x()}; }
-
-double cross(const Point& a, const Point& b) { return a.x() * b.y() - a.y() * b.x(); }
-
-// Parabola y = a + b x + c x^2 fitted to points.
-struct Parabola {
-  Eigen::Vector3d coefficients = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();  // A'A
-
-  void solve(const Eigen::Vector3d& right_side) { coefficients = normal.inverse() * right_side; }
-};
-
-template <typename Nodes>
-Parabola fitParabola(const Nodes& nodes, std::size_t first, std::size_t last, const Point& origin,
-                     const Point& direction) {
-  Parabola fit;
-  double m1 = 0.0;
-  double m2 = 0.0;
-  double m3 = 0.0;
-  double m4 = 0.0;
-  Eigen::Vector3d right_side = Eigen::Vector3d::Zero();
-  for (std::size_t i = first; i <= last; ++i) {
-    const Point d = nodes[i].position - origin;
-    const double x = d.dot(direction);
-    const double y = cross(direction, d);
-    const double xx = x * x;
-    m1 += x;
-    m2 += xx;
-    m3 += xx * x;
-    m4 += xx * xx;
-    right_side += Eigen::Vector3d(y, x * y, xx * y);
-  }
-  const auto count = static_cast<double>(last - first + 1);
-  fit.normal << count, m1, m2, m1, m2, m3, m2, m3, m4;
-  fit.solve(right_side);
-  return fit;
-}
 
 }  // namespace
 
@@ -90,7 +55,9 @@ CenterlineParameters loadCenterline(config::Node node) {
 }
 
 CenterlineEstimator::CenterlineEstimator(const CenterlineParameters& parameters)
-    : parameters_(parameters) {}
+    : parameters_(parameters), fit_(new ArcLengthFit) {}
+
+CenterlineEstimator::~CenterlineEstimator() = default;
 
 void CenterlineEstimator::reset() {
   tunnel_ = Tunnel();
@@ -207,16 +174,22 @@ TunnelReason CenterlineEstimator::checkWidth(const std::optional<Pose>& pose) {
 
 // Merges this scan's nodes into those kept in the odom frame, and reads them back.
 void CenterlineEstimator::remember(const Pose& pose) {
+  const double c = std::cos(pose.heading);
+  const double s = std::sin(pose.heading);
   for (Node& node : measured_) {
     const double ratio = node.position.norm() / parameters_.far_distance;
     node.weight = 1.0 / (1.0 + ratio * ratio);
-    node.position = pose.transform(node.position);
+    const Point p = node.position;
+    node.position = pose.position() + Point(c * p.x() - s * p.y(), s * p.x() + c * p.y());
   }
   if (!fuse()) memory_.clear();
   appendMeasured();
   forgetBehind(pose);
   nodes_ = memory_;
-  for (Node& node : nodes_) node.position = pose.inverseTransform(node.position);
+  for (Node& node : nodes_) {
+    const Point d = node.position - pose.position();
+    node.position = {c * d.x() + s * d.y(), c * d.y() - s * d.x()};
+  }
 }
 
 // Moves each remembered node towards the measured centerline. False when they do not fit together.
@@ -274,36 +247,37 @@ void CenterlineEstimator::forgetBehind(const Pose& pose) {
   memory_.erase(memory_.begin(), memory_.begin() + static_cast<std::ptrdiff_t>(first));
 }
 
-// Path samples of the nodes, each with the parabola's heading and curvature.
-void CenterlineEstimator::fitPath() {
-  path_.clear();
-  std::size_t first = 0;
-  std::size_t last = 0;
+// First and last node of the fit about node `i`: those within fit_reach, at the ends the whole first or
+// last stretch of the same length, and never fewer than kFewestInFit.
+std::pair<std::size_t, std::size_t> CenterlineEstimator::fitWindow(std::size_t i) const {
+  const ArcLengthFit& fit = *fit_;
   const double reach = parameters_.fit_reach;
-  const std::size_t end = nodes_.size() - 1;
-  for (std::size_t i = 0; i <= end; ++i) {
-    const auto distance = [&](std::size_t k) { return (nodes_[k].position - nodes_[i].position).norm(); };
-    while (last < end && distance(last) < reach) ++last;
-    while (first < i && distance(first) > reach) ++first;
-    // At the ends the window is the whole first or last stretch.
-    std::size_t from = first;
-    std::size_t to = last;
-    const auto too_small = [&] {
-      return to - from < kFewestInFit - 1 ||
-             (nodes_[to].position - nodes_[from].position).norm() < 2.0 * reach;
-    };
-    while (to < end && too_small()) ++to;
-    while (from > 0 && too_small()) --from;
-    const Point direction = (nodes_[to].position - nodes_[from].position).normalized();
-    const Parabola fit = fitParabola(nodes_, from, to, nodes_[i].position, direction);
-    const double a = fit.coefficients(0);
-    const double b = fit.coefficients(1);
-    const Point place = nodes_[i].position + a * leftOf(direction);
-    const double heading = std::atan2(direction.y(), direction.x()) + std::atan(b);
-    const double s =
-        path_.empty() ? 0.0 : path_.back().s + std::hypot(place.x() - path_.back().x, place.y() - path_.back().y);
-    path_.push_back({s, place.x(), place.y(), heading,
-                     2.0 * fit.coefficients(2) / std::pow(1.0 + b * b, 1.5)});
+  const std::size_t end = fit.size() - 1;
+  std::size_t first = i;
+  std::size_t last = i;
+  while (first > 0 && fit.s(i) - fit.s(first - 1) <= reach) --first;
+  while (last < end && fit.s(last + 1) - fit.s(i) <= reach) ++last;
+  const auto too_small = [&] {
+    return last - first < kFewestInFit - 1 || fit.s(last) - fit.s(first) < 2.0 * reach - kCurveStep;
+  };
+  while (last < end && too_small()) ++last;
+  while (first > 0 && too_small()) --first;
+  return {first, last};
+}
+
+// Path samples of the nodes, each with the parabola's place, heading and curvature.
+void CenterlineEstimator::fitPath() {
+  fit_->clear();
+  for (const Node& node : nodes_) fit_->add(node.position);
+  path_.clear();
+  for (std::size_t i = 0; i < nodes_.size(); ++i) {
+    const auto [first, last] = fitWindow(i);
+    const ArcLengthFit::Parabola parabola = fit_->fit(first, last, fit_->s(i));
+    const Point& place = parabola.place;
+    const double s = path_.empty() ? 0.0
+                                   : path_.back().s + (place - Point(path_.back().x, path_.back().y)).norm();
+    path_.push_back({s, place.x(), place.y(), std::atan2(parabola.tangent.y(), parabola.tangent.x()),
+                     parabola.curvature()});
   }
   prolongBackwards();
 }
@@ -318,23 +292,23 @@ bool CenterlineEstimator::isPlausible() const {
     if (!finite) return false;
     if (i == 0) continue;
     if (!(p.s > path_[i - 1].s)) return false;
-    if (std::abs(geometry::wrapAngle(p.heading - path_[i - 1].heading)) > kKink) return false;
+    const double turn = p.heading - path_[i - 1].heading;
+    if (std::abs(turn) > kKink && std::abs(geometry::wrapAngle(turn)) > kKink) return false;
   }
   return path_.back().s - path_.front().s >= parameters_.length_min;
 }
 
 // Back to beside the reference point, at the first sample's curvature.
 void CenterlineEstimator::prolongBackwards() {
-  constexpr double kStep = 0.5;
   constexpr double kBehind = 0.5;  // [m]
   std::vector<PathPoint> added;
   PathPoint p = path_.front();
   while (p.x * std::cos(p.heading) + p.y * std::sin(p.heading) > -kBehind && added.size() < 40) {
-    const double mean_heading = p.heading - 0.5 * kStep * p.curvature;
-    p.x -= kStep * std::cos(mean_heading);
-    p.y -= kStep * std::sin(mean_heading);
-    p.heading -= kStep * p.curvature;
-    p.s -= kStep;
+    const double mean_heading = p.heading - 0.5 * kCurveStep * p.curvature;
+    p.x -= kCurveStep * std::cos(mean_heading);
+    p.y -= kCurveStep * std::sin(mean_heading);
+    p.heading -= kCurveStep * p.curvature;
+    p.s -= kCurveStep;
     added.push_back(p);
   }
   path_.insert(path_.begin(), added.rbegin(), added.rend());
@@ -349,28 +323,29 @@ void CenterlineEstimator::fillState(const Walls& walls) {
   state.lateral_offset = foot.lateral_offset;
   state.heading_error = geometry::wrapAngle(-foot.heading);
   state.curvature = foot.curvature;
-  // Nodes nearest to the reference point: their mean spacing apart, from `first` to `last`.
   const auto nearest = std::min_element(nodes_.begin(), nodes_.end(), [](const Node& a, const Node& b) {
     return a.position.squaredNorm() < b.position.squaredNorm();
   });
   state.width = nearest->width;
-  const auto at = static_cast<std::size_t>(std::distance(nodes_.begin(), nearest));
-  std::size_t first = at;
-  std::size_t last = at;
-  const double span = 2.0 * parameters_.fit_reach;
-  while (first > 0 && nodes_[first - 1].position.norm() < parameters_.fit_reach) --first;
-  while (last + 1 < nodes_.size() && (nodes_[last].position - nodes_[first].position).norm() < span) ++last;
-  const Point direction(std::cos(foot.heading), std::sin(foot.heading));
-  const Point origin = -foot.lateral_offset * leftOf(direction);
-  const Parabola fit = fitParabola(nodes_, first, last, origin, direction);
-  const double spacing = (nodes_[last].position - nodes_[first].position).norm() / static_cast<double>(last - first);
-  const double residual = std::max({walls.left.residual, walls.right.residual, parameters_.wall_deviation});
+  fillCovariance(walls, static_cast<std::size_t>(std::distance(nodes_.begin(), nearest)));
+}
+
+// Of the fit about node `at`, the nearest to the reference point, taken at that point's foot.
+void CenterlineEstimator::fillCovariance(const Walls& walls, std::size_t at) {
+  const auto [first, last] = fitWindow(at);
+  const Point forward = (nodes_[std::min(at + 1, last)].position - nodes_[at > 0 ? at - 1 : at].position).normalized();
+  const double foot = fit_->s(at) - nodes_[at].position.dot(forward);
+  const ArcLengthFit::Parabola parabola = fit_->fit(first, last, foot);
+  const double count = static_cast<double>(last - first + 1);
+  const double spacing = (fit_->s(last) - fit_->s(first)) / (count - 1.0);
+  const double deviation =
+      std::max({walls.left.residual, walls.right.residual, parameters_.wall_deviation});
   const double dependent = std::max(1.0, 2.0 * parameters_.wall_correlation / spacing);
-  const double variance = residual * residual * dependent * (paired_now_ ? 0.5 : 1.0);
-  const Eigen::Matrix3d c = variance * fit.normal.inverse();
+  const double variance = deviation * deviation * dependent * (paired_now_ ? 0.5 : 1.0);
+  const Eigen::Matrix3d c = variance * parabola.inverse_normal;
   // (offset, heading error, curvature) = (-a, -b, 2 c); the width is the mean of as many pairs.
-  const double w = 4.0 * variance / static_cast<double>(last - first + 1);
-  state.covariance = {c(0, 0),        c(0, 1),        -2.0 * c(0, 2), 0.0,  //
+  const double w = 4.0 * variance / count;
+  tunnel_.state.covariance = {c(0, 0),        c(0, 1),        -2.0 * c(0, 2), 0.0,  //
                       c(1, 0),        c(1, 1),        -2.0 * c(1, 2), 0.0,  //
                       -2.0 * c(2, 0), -2.0 * c(2, 1), 4.0 * c(2, 2),  0.0,  //
                       0.0,            0.0,            0.0,            w};

@@ -103,18 +103,16 @@ std::optional<CorridorSeed> CorridorSeeder::find(const std::vector<PointGroup>& 
   return best;
 }
 
-CorridorSeed CorridorSeeder::findAlong(const std::vector<PointGroup>& groups, const geometry::Pose& frame,
+CorridorSeed CorridorSeeder::findAlong(const std::vector<PointGroup>& groups, const SliceFrame& frame,
                                        double curvature, double length) {
   x_.clear();
   y_.clear();
-  const auto c = static_cast<float>(std::cos(frame.heading));
-  const auto s = static_cast<float>(std::sin(frame.heading));
-  const auto x0 = static_cast<float>(frame.x);
-  const auto y0 = static_cast<float>(frame.y);
   for (const PointGroup& g : groups) {
-    const float along = c * (g.x - x0) + s * (g.y - y0);
+    const float dx = g.x - frame.x;
+    const float dy = g.y - frame.y;
+    const float along = frame.cosine * dx + frame.sine * dy;
     if (along < 0.0F || along > static_cast<float>(length)) continue;
-    gather(along, c * (g.y - y0) - s * (g.x - x0));
+    gather(along, frame.cosine * dy - frame.sine * dx);
   }
   float votes = 0.0F;
   return judge(0.0F, static_cast<float>(curvature), votes);

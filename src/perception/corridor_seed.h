@@ -26,8 +26,8 @@ class CorridorSeeder {
   explicit CorridorSeeder(const WallSegmentationParameters& parameters);
   std::optional<CorridorSeed> find(const std::vector<PointGroup>& groups);
   /// Walls left and right along the arc through `frame`, from the groups within `length` [m] ahead of it.
-  CorridorSeed findAlong(const std::vector<PointGroup>& groups, const geometry::Pose& frame,
-                         double curvature, double length);
+  CorridorSeed findAlong(const std::vector<PointGroup>& groups, const SliceFrame& frame, double curvature,
+                         double length);
 
  private:
   static constexpr int kBins = 64;  // either side

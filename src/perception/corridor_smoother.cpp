@@ -1,22 +1,11 @@
 #include "corridor_smoother.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include <Eigen/LU>
 
 namespace tunnel_pilot::perception {
 namespace {
-
-// The node `length` farther along its own arc.
-CorridorNode move(const CorridorNode& from, double length) {
-  const double mean_heading = from.pose.heading + 0.5 * length * from.curvature;
-  CorridorNode to = from;
-  to.pose.x += length * std::cos(mean_heading);
-  to.pose.y += length * std::sin(mean_heading);
-  to.pose.heading += length * from.curvature;
-  return to;
-}
 
 // P <- F P F' with F = [1 l l^2/2 0; 0 1 l 0; 0 0 1 0; 0 0 0 1], the transition over length l.
 CorridorSmoother::Matrix transition(double l) {
@@ -42,7 +31,8 @@ void CorridorSmoother::advance(double length) {
   const Matrix f = transition(length);
   Step to;
   to.length = length;
-  to.predicted = move(from.node, length);
+  to.predicted = from.node;
+  to.predicted.move(length);
   to.predicted_covariance = f * from.covariance * f.transpose();
   // White noise of curvature's rate, integrated over the step (e, psi, kappa).
   const double l = length;
@@ -98,9 +88,8 @@ void CorridorSmoother::step(double shift, double half_width, double deviation) {
 }
 
 void CorridorSmoother::fold(const Vector& error, CorridorNode& node) {
-  node.pose.x -= error(0) * std::sin(node.pose.heading);
-  node.pose.y += error(0) * std::cos(node.pose.heading);
-  node.pose.heading += error(1);
+  node.position += error(0) * node.direction.left();
+  node.direction = node.direction.turned(error(1));
   node.curvature += error(2);
   node.half_width += error(3);
 }
@@ -111,13 +100,11 @@ void CorridorSmoother::smooth() {
     const Step& next = steps_[i + 1];
     const Matrix f = transition(next.length);
     const Matrix gain = step.covariance * f.transpose() * next.predicted_covariance.inverse();
-    const geometry::Pose& expected = next.predicted.pose;
-    const double dx = next.node.pose.x - expected.x;
-    const double dy = next.node.pose.y - expected.y;
-    const Vector correction(dy * std::cos(expected.heading) - dx * std::sin(expected.heading),
-                            next.node.pose.heading - expected.heading,
-                            next.node.curvature - next.predicted.curvature,
-                            next.node.half_width - next.predicted.half_width);
+    const CorridorNode& expected = next.predicted;
+    const Vector correction((next.node.position - expected.position).dot(expected.direction.left()),
+                            next.node.direction.angle() - expected.direction.angle(),
+                            next.node.curvature - expected.curvature,
+                            next.node.half_width - expected.half_width);
     fold(gain * correction, step.node);
     step.covariance += gain * (next.covariance - next.predicted_covariance) * gain.transpose();
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -17,6 +18,11 @@ struct PointGroup {
   int last = 0;
 };
 
+/// Frame of a slice across the tunnel: place and direction along the tunnel.
+struct SliceFrame {
+  float x, y, cosine, sine;
+};
+
 /// Point groups hashed into a grid of square cells (lists threaded through an array).
 class PointGrid {
  public:
@@ -26,7 +32,7 @@ class PointGrid {
   /// Calls visit(group index, along, lateral) for each group whose place in `frame` lies in
   /// [-half_length, half_length) x [low, high].
   template <typename Visit>
-  void visitSlice(const std::vector<PointGroup>& groups, const geometry::Pose& frame, double half_length,
+  void visitSlice(const std::vector<PointGroup>& groups, const SliceFrame& frame, double half_length,
                   double low, double high, Visit visit) const;
 
  private:
@@ -36,8 +42,9 @@ class PointGrid {
   static constexpr float kFirstX = -30.0F;  // [m]
   static constexpr float kFirstY = -48.0F;  // [m]
 
-  static int column(float x) { return static_cast<int>(std::floor((x - kFirstX) / kCell)); }
-  static int row(float y) { return static_cast<int>(std::floor((y - kFirstY) / kCell)); }
+  // Cells count from one, so that truncation puts all that lies before the grid into column or row 0.
+  static int column(float x) { return static_cast<int>(std::max(x - kFirstX, -kCell) / kCell + 1.0F); }
+  static int row(float y) { return static_cast<int>(std::max(y - kFirstY, -kCell) / kCell + 1.0F); }
 
   std::array<std::int16_t, kSizeX * kSizeY> heads_{};
   std::vector<std::int16_t> next_;
@@ -49,7 +56,7 @@ inline void PointGrid::fill(const std::vector<PointGroup>& groups) {
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const int cx = column(groups[g].x);
     const int cy = row(groups[g].y);
-    if (cx < 0 || cy < 0 || cx >= kSizeX || cy >= kSizeY) continue;
+    if (cx < 1 || cy < 1 || cx >= kSizeX || cy >= kSizeY) continue;
     std::int16_t& head = heads_[static_cast<std::size_t>(cy * kSizeX + cx)];
     next_[g] = head;
     head = static_cast<std::int16_t>(g);
@@ -57,12 +64,12 @@ inline void PointGrid::fill(const std::vector<PointGroup>& groups) {
 }
 
 template <typename Visit>
-void PointGrid::visitSlice(const std::vector<PointGroup>& groups, const geometry::Pose& frame,
+void PointGrid::visitSlice(const std::vector<PointGroup>& groups, const SliceFrame& frame,
                            double half_length, double low, double high, Visit visit) const {
-  const auto c = static_cast<float>(std::cos(frame.heading));
-  const auto s = static_cast<float>(std::sin(frame.heading));
-  const auto x0 = static_cast<float>(frame.x);
-  const auto y0 = static_cast<float>(frame.y);
+  const float c = frame.cosine;
+  const float s = frame.sine;
+  const float x0 = frame.x;
+  const float y0 = frame.y;
   const auto half = static_cast<float>(half_length);
   const auto near = static_cast<float>(low);
   const auto far = static_cast<float>(high);

@@ -15,6 +15,8 @@
 namespace tunnel_pilot::perception {
 namespace {
 
+using geometry::Point;
+
 constexpr std::size_t kMaxNodes = 100;      // slices across the tunnel
 constexpr double kUnseenBeforeWidening = 2.0;  // [m] without either wall before another width is looked for
 constexpr double kTaperCoverage = 0.3;    // of the slice's length
@@ -43,11 +45,9 @@ struct WallSlice {
 
 double square(double x) { return x * x; }
 
-void moveAlongArc(double length, CorridorNode& node) {
-  const double mean_heading = node.pose.heading + 0.5 * length * node.curvature;
-  node.pose.x += length * std::cos(mean_heading);
-  node.pose.y += length * std::sin(mean_heading);
-  node.pose.heading += length * node.curvature;
+SliceFrame frameOf(const CorridorNode& node) {
+  return {static_cast<float>(node.position.x()), static_cast<float>(node.position.y()),
+          static_cast<float>(node.direction.cosine()), static_cast<float>(node.direction.sine())};
 }
 
 }  // namespace
@@ -103,6 +103,13 @@ struct WallSegmentation::Impl {
   std::array<std::vector<float>, 2> seen;            // by side and node: share of the slice that shows the wall
 
   void group(const pcl::PointCloud<pcl::PointXYZ>& cloud, const std::vector<int>& indices);
+  // The centerline about every kCurveSpacing, from the first node of the curves on.
+  struct Sample {
+    Point center, to_left;
+  };
+  std::vector<Sample> samples;
+  int samples_per_node = 1;
+
   std::optional<CorridorNode> guess;                 // where the last scan's tunnel began
   Stamp guess_stamp{};
   double guess_width_deviation = 0.0;                // of its half width [m]
@@ -120,15 +127,15 @@ struct WallSegmentation::Impl {
   bool measureSlice(const std::array<bool, 2>& followed);
   double deviationOf(std::size_t side) const;
   double gateOf(std::size_t side) const;
-  WallSlice lookForWall(std::size_t side, double gate);
+  WallSlice lookForWall(std::size_t side, double gate, const SliceFrame& frame);
   bool movedAlike(const std::array<WallSlice, 2>& slices) const;
-  void taper(std::array<WallSlice, 2>& slices);
+  void taper(const SliceFrame& frame, std::array<WallSlice, 2>& slices);
   void measure(std::size_t side, const WallSlice& slice);
   std::size_t firstSeen() const;
   void finish(const pcl::PointCloud<pcl::PointXYZ>& cloud, std::size_t side, std::size_t first, Wall& wall);
   void collectInliers(const pcl::PointCloud<pcl::PointXYZ>& cloud, std::size_t side, Wall& wall);
   bool isWall(std::size_t side) const;
-  void drawCurve(std::size_t side, std::size_t first, std::size_t last, Wall& wall) const;
+  void sampleCenterline(std::size_t first);
 };
 
 WallSegmentation::WallSegmentation(const WallSegmentationParameters& parameters)
@@ -153,6 +160,7 @@ const Walls& WallSegmentation::segment(Stamp stamp) {
   if (walls_.enough_returns) {
     impl_->find(stamp);
     const std::size_t first = impl_->firstSeen();
+    impl_->sampleCenterline(first);
     impl_->finish(*input_, 0, first, walls_.left);
     impl_->finish(*input_, 1, first, walls_.right);
     impl_->keepGuess(stamp, walls_);
@@ -249,14 +257,13 @@ void WallSegmentation::Impl::keepGuess(Stamp stamp, const Walls& walls) {
     // One wall alone says nothing new about the width: the place of the better one counts.
     const double side = seen_near.left_better ? 1.0 : -1.0;
     const double shift = side * (next.half_width - guess->half_width);
-    next.pose.x -= shift * std::sin(next.pose.heading);
-    next.pose.y += shift * std::cos(next.pose.heading);
+    next.position += shift * next.direction.left();
     next.half_width = guess->half_width;
   } else {
     const double deviation = std::sqrt(smoother.covariance(first)(3, 3));
     guess_width_deviation = std::clamp(deviation, kWidthDeviationMin, kWidthDeviationMax);
   }
-  moveAlongArc(-p.step * static_cast<double>(first), next);
+  next.move(-p.step * static_cast<double>(first));
   guess = next;
   guess_stamp = stamp;
 }
@@ -285,8 +292,9 @@ CorridorNode WallSegmentation::Impl::startOf(const CorridorSeed& seed) const {
   node.curvature = seed.curvature / (1.0 - middle * seed.curvature);
   node.half_width = 0.5 * (left - right);
   // Back along the arc to where the curves shall begin.
-  node.pose = {-middle * std::sin(seed.heading), middle * std::cos(seed.heading), seed.heading};
-  moveAlongArc(-p.look_behind, node);
+  node.direction = Direction(seed.heading);
+  node.position = middle * node.direction.left();
+  node.move(-p.look_behind);
   return node;
 }
 
@@ -327,7 +335,7 @@ void WallSegmentation::Impl::follow(const CorridorNode& start, const CorridorSmo
 // goes back to the first slice without them and takes the new width from there.
 bool WallSegmentation::Impl::widen(std::size_t node) {
   const CorridorNode& at = smoother.node(node);
-  const CorridorSeed walls = seeder.findAlong(groups, at.pose, at.curvature, kWideningLength);
+  const CorridorSeed walls = seeder.findAlong(groups, frameOf(at), at.curvature, kWideningLength);
   if (!walls.left || !walls.right) return false;
   const double width = *walls.left - *walls.right;
   const double shift = 0.5 * (*walls.left + *walls.right);
@@ -340,12 +348,13 @@ bool WallSegmentation::Impl::widen(std::size_t node) {
 
 // Measures the walls in the last node's slice; true when any was seen.
 bool WallSegmentation::Impl::measureSlice(const std::array<bool, 2>& followed) {
+  const SliceFrame slice_frame = frameOf(smoother.last());
   std::array<WallSlice, 2> slices;
   for (std::size_t side = 0; side < 2; ++side) {
-    if (followed[side]) slices[side] = lookForWall(side, gateOf(side));
+    if (followed[side]) slices[side] = lookForWall(side, gateOf(side), slice_frame);
   }
   const bool lost = slices[0].groups * slices[1].groups == 0;
-  if (followed[0] && followed[1] && (lost || movedAlike(slices))) taper(slices);
+  if (followed[0] && followed[1] && (lost || movedAlike(slices))) taper(slice_frame, slices);
   for (std::size_t side = 0; side < 2; ++side) {
     const bool measured = slices[side].groups > 0;
     if (measured) measure(side, slices[side]);
@@ -362,7 +371,7 @@ double WallSegmentation::Impl::gateOf(std::size_t side) const {
   return std::clamp(3.0 * deviationOf(side), p.gate_min, p.gate_max);
 }
 
-WallSlice WallSegmentation::Impl::lookForWall(std::size_t side, double gate) {
+WallSlice WallSegmentation::Impl::lookForWall(std::size_t side, double gate, const SliceFrame& frame) {
   const CorridorNode& node = smoother.last();
   const double middle = kSides[side] * node.half_width;
   std::vector<std::int8_t>& mine = taken[side];
@@ -370,7 +379,7 @@ WallSlice WallSegmentation::Impl::lookForWall(std::size_t side, double gate) {
   WallSlice slice;
   float nearest = std::numeric_limits<float>::max();
   float farthest = std::numeric_limits<float>::lowest();
-  grid.visitSlice(groups, node.pose, 0.5 * p.step, middle - gate, middle + gate,
+  grid.visitSlice(groups, frame, 0.5 * p.step, middle - gate, middle + gate,
                   [&](int group, float along, float lateral) {
                     nearest = std::min(nearest, along);
                     farthest = std::max(farthest, along);
@@ -399,8 +408,9 @@ bool WallSegmentation::Impl::movedAlike(const std::array<WallSlice, 2>& slices) 
 }
 
 // Where both walls moved alike, the tunnel's width changes; an obstacle or a bay moves only one.
-void WallSegmentation::Impl::taper(std::array<WallSlice, 2>& slices) {
-  const std::array<WallSlice, 2> wide = {lookForWall(0, p.gate_max), lookForWall(1, p.gate_max)};
+void WallSegmentation::Impl::taper(const SliceFrame& frame, std::array<WallSlice, 2>& slices) {
+  const std::array<WallSlice, 2> wide = {lookForWall(0, p.gate_max, frame),
+                                         lookForWall(1, p.gate_max, frame)};
   if (!movedAlike(wide)) return;
   const double change = 0.5 * (wide[0].outward + wide[1].outward);
   smoother.step(0.0, smoother.last().half_width + change, p.wall_deviation);
@@ -443,67 +453,61 @@ void WallSegmentation::Impl::finish(const pcl::PointCloud<pcl::PointXYZ>& cloud,
   wall.found = true;
   std::size_t last = seen[side].size() - 1;
   while (seen[side][last] == 0.0F) --last;
-  drawCurve(side, first, last, wall);
+  const std::size_t count = (last - first) * static_cast<std::size_t>(samples_per_node) + 1;
+  for (std::size_t k = 0; k < count; ++k) {
+    wall.curve.push_back(samples[k].center + kSides[side] * samples[k].to_left);
+  }
   collectInliers(cloud, side, wall);
 }
 
-void WallSegmentation::Impl::drawCurve(std::size_t side, std::size_t first, std::size_t last, Wall& wall) const {
-  const int pieces = std::max(1, static_cast<int>(std::lround(p.step / kCurveSpacing)));
-  for (std::size_t i = first; i <= last; ++i) {
+// Samples of the centerline from node `first` on, with the way from it to the left wall: cubic Hermite
+// pieces between the nodes.
+void WallSegmentation::Impl::sampleCenterline(std::size_t first) {
+  samples_per_node = std::max(1, static_cast<int>(std::lround(p.step / kCurveSpacing)));
+  samples.clear();
+  for (std::size_t i = first; i < smoother.size(); ++i) {
     const CorridorNode& a = smoother.node(i);
-    const int count = i < last ? pieces : 1;
-    for (int j = 0; j < count; ++j) {
-      const double t = static_cast<double>(j) / pieces;
-      CorridorNode n = a;
-      if (j > 0) {
-        // Cubic Hermite between the nodes.
-        const CorridorNode& b = smoother.node(i + 1);
-        const double l = p.step;
-        const double h1 = t * t * (3.0 - 2.0 * t);
-        const double m0 = l * t * square(1.0 - t);
-        const double m1 = l * t * t * (t - 1.0);
-        n.pose.x = a.pose.x + h1 * (b.pose.x - a.pose.x) + m0 * std::cos(a.pose.heading) + m1 * std::cos(b.pose.heading);
-        n.pose.y = a.pose.y + h1 * (b.pose.y - a.pose.y) + m0 * std::sin(a.pose.heading) + m1 * std::sin(b.pose.heading);
-        n.pose.heading = a.pose.heading + t * (b.pose.heading - a.pose.heading);
-        n.half_width = a.half_width + t * (b.half_width - a.half_width);
-      }
-      const double offset = kSides[side] * n.half_width;
-      wall.curve.emplace_back(n.pose.x - offset * std::sin(n.pose.heading),
-                              n.pose.y + offset * std::cos(n.pose.heading));
+    samples.push_back({a.position, a.half_width * a.direction.left()});
+    if (i + 1 == smoother.size()) break;
+    const CorridorNode& b = smoother.node(i + 1);
+    for (int j = 1; j < samples_per_node; ++j) {
+      const double t = static_cast<double>(j) / samples_per_node;
+      const Point chord = b.position - a.position;
+      const Point center = a.position + t * t * (3.0 - 2.0 * t) * chord +
+                           p.step * t * square(1.0 - t) * a.direction.along() +
+                           p.step * t * t * (t - 1.0) * b.direction.along();
+      const Point left = ((1.0 - t) * a.direction.left() + t * b.direction.left()).normalized();
+      samples.push_back({center, (a.half_width + t * (b.half_width - a.half_width)) * left});
     }
   }
 }
 
 void WallSegmentation::Impl::collectInliers(const pcl::PointCloud<pcl::PointXYZ>& cloud, std::size_t side,
                                             Wall& wall) {
-  struct Place {
-    float x, y, cosine, sine, offset, half_bend;
+  struct Line {
+    SliceFrame frame;
+    float offset, half_bend;
   };
-  const double sign = kSides[side];
-  std::array<Place, kMaxNodes> places;
+  std::array<Line, kMaxNodes + 1> lines;
   for (std::size_t i = 0; i < smoother.size(); ++i) {
     const CorridorNode& n = smoother.node(i);
-    const double offset = sign * n.half_width;
+    const double offset = kSides[side] * n.half_width;
     const double bend = n.curvature / std::max(0.2, 1.0 - offset * n.curvature);
-    places[i] = {static_cast<float>(n.pose.x),
-                 static_cast<float>(n.pose.y),
-                 static_cast<float>(std::cos(n.pose.heading)),
-                 static_cast<float>(std::sin(n.pose.heading)),
-                 static_cast<float>(offset),
-                 static_cast<float>(0.5 * bend)};
+    lines[i] = {frameOf(n), static_cast<float>(offset), static_cast<float>(0.5 * bend)};
   }
   const auto reach = static_cast<float>(p.inlier_distance);
   const std::vector<std::int8_t>& node_of = taken[side];
   double sum = 0.0;
   for (std::size_t g = 0; g < groups.size(); ++g) {
     if (node_of[g] < 0) continue;
-    const Place& n = places[static_cast<std::size_t>(node_of[g])];
+    const Line& n = lines[static_cast<std::size_t>(node_of[g])];
     for (int k = groups[g].first; k < groups[g].last; ++k) {
       const int index = order[static_cast<std::size_t>(k)];
       const pcl::PointXYZ& point = cloud.points[static_cast<std::size_t>(index)];
-      const float along = n.cosine * (point.x - n.x) + n.sine * (point.y - n.y);
-      const float lateral = n.cosine * (point.y - n.y) - n.sine * (point.x - n.x);
-      const float miss = lateral - n.offset - n.half_bend * along * along;
+      const float dx = point.x - n.frame.x;
+      const float dy = point.y - n.frame.y;
+      const float along = n.frame.cosine * dx + n.frame.sine * dy;
+      const float miss = n.frame.cosine * dy - n.frame.sine * dx - n.offset - n.half_bend * along * along;
       if (std::abs(miss) > reach) continue;
       sum += static_cast<double>(miss * miss);
       wall.indices.push_back(index);

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "tunnel_pilot/config/node.h"
@@ -8,6 +10,8 @@
 #include "tunnel_pilot/perception/types.h"
 
 namespace tunnel_pilot::perception {
+
+class ArcLengthFit;
 
 struct CenterlineParameters {
   double width_min = 0.0;           ///< narrower is no tunnel [m]
@@ -38,13 +42,16 @@ CenterlineParameters loadCenterline(config::Node node);
 /// frame, each averaged over the scans that saw it (so the reference point, which lies behind what the
 /// lidar sees, gets what was measured there before); without odometry each scan stands for itself, and
 /// the centerline is prolonged backwards at constant curvature. Heading and curvature are those of a
-/// least-squares parabola  y = a + b x + c x^2  over +- fit_reach:
-///     heading = atan b,  curvature = 2 c / (1 + b^2)^1.5,
+/// least-squares parabola over arc length,  p(t) = a + b t + c t^2  within +- fit_reach:
+///     heading = atan2(b_y, b_x),  curvature = (b x 2 c) / |b|^3,
 /// and the covariance is the fit's, sigma^2 (A'A)^-1, times the number of samples within two correlation
 /// lengths of the walls' roughness, whose errors are not independent.
 class CenterlineEstimator {
  public:
   explicit CenterlineEstimator(const CenterlineParameters& parameters);
+  ~CenterlineEstimator();
+  CenterlineEstimator(const CenterlineEstimator&) = delete;
+  CenterlineEstimator& operator=(const CenterlineEstimator&) = delete;
 
   /// `odom_pose` is base_link in a smooth frame (dead reckoning) at the walls' stamp; nothing when there
   /// is no odometry. A pose that is not finite counts as none. The result is this object's and stands
@@ -72,10 +79,12 @@ class CenterlineEstimator {
   bool fuse();
   void appendMeasured();
   void forgetBehind(const geometry::Pose& pose);
+  std::pair<std::size_t, std::size_t> fitWindow(std::size_t i) const;
   void fitPath();
   bool isPlausible() const;
   void prolongBackwards();
   void fillState(const Walls& walls);
+  void fillCovariance(const Walls& walls, std::size_t at);
 
   CenterlineParameters parameters_;
   Tunnel tunnel_;
@@ -83,6 +92,7 @@ class CenterlineEstimator {
   std::vector<Node> memory_;     // in the odom frame
   std::vector<Node> nodes_;      // what the path is made of, in base_link
   std::vector<geometry::PathPoint> path_;
+  std::unique_ptr<ArcLengthFit> fit_;
 
   bool paired_now_ = false;
   std::optional<double> last_width_;   // beside the truck, once both walls were seen [m]

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
+#include <limits>
 #include <vector>
 
 #include <pcl/common/io.h>
@@ -76,33 +78,45 @@ class IsolatedReturnFilter : public pcl::FilterIndices<PointT> {
  private:
   static constexpr int kNotFinite = -1;
 
-  // Squared distance within which points keep this one; below zero for a point that is not finite.
-  float reachSquared(const PointT& p) const {
-    const float range = (p.getVector3fMap() - this->input_->sensor_origin_.template head<3>()).norm();
-    if (!std::isfinite(range)) return -1.0F;
-    const float reach = distance_ + slope_ * range;
-    return reach * reach;
+  // Coordinates as arrays, so that the compiler may work on several points at once; comparisons with the
+  // NaN of a point that is not finite are false, so it is nobody's neighbour.
+  void gather() {
+    const std::vector<int>& order = *this->indices_;
+    const std::size_t size = order.size();
+    for (std::vector<float>* v : {&x_, &y_, &z_, &reach_squared_}) v->resize(size);
+    const Eigen::Vector4f& origin = this->input_->sensor_origin_;
+    for (std::size_t i = 0; i < size; ++i) {
+      const PointT& p = this->input_->points[static_cast<std::size_t>(order[i])];
+      x_[i] = p.x - origin[0];
+      y_[i] = p.y - origin[1];
+      z_[i] = p.z - origin[2];
+    }
+    for (std::size_t i = 0; i < size; ++i) {
+      const float reach = distance_ + slope_ * std::sqrt(x_[i] * x_[i] + y_[i] * y_[i] + z_[i] * z_[i]);
+      reach_squared_[i] = reach * reach;
+    }
   }
 
   void countNeighbors() {
-    const std::vector<int>& order = *this->indices_;
-    const int size = static_cast<int>(order.size());
-    neighbors_.assign(order.size(), 0);
-    reach_squared_.resize(order.size());
-    for (int i = 0; i < size; ++i) {
-      reach_squared_[i] = reachSquared(this->input_->points[order[i]]);
-      if (reach_squared_[i] < 0.0F) neighbors_[i] = kNotFinite;
-    }
-    for (int i = 0; i < size; ++i) {
-      if (neighbors_[i] == kNotFinite) continue;
-      const PointT& p = this->input_->points[order[i]];
-      for (int j = i + 1; j < size && j <= i + window_; ++j) {
-        if (neighbors_[j] == kNotFinite) continue;
-        const PointT& q = this->input_->points[order[j]];
-        const float gap_squared = (p.getVector3fMap() - q.getVector3fMap()).squaredNorm();
-        if (gap_squared <= reach_squared_[i]) ++neighbors_[i];
-        if (gap_squared <= reach_squared_[j]) ++neighbors_[j];
+    gather();
+    const std::size_t size = x_.size();
+    neighbors_.assign(size, 0);
+    for (std::size_t k = 1; k <= static_cast<std::size_t>(window_) && k < size; ++k) {
+      near_.resize(size - k);
+      for (std::size_t i = 0; i < size - k; ++i) {
+        const float dx = x_[i + k] - x_[i];
+        const float dy = y_[i + k] - y_[i];
+        const float dz = z_[i + k] - z_[i];
+        near_[i] = dx * dx + dy * dy + dz * dz;
       }
+      for (std::size_t i = 0; i < size - k; ++i) neighbors_[i] += near_[i] <= reach_squared_[i] ? 1 : 0;
+      for (std::size_t i = 0; i < size - k; ++i) {
+        neighbors_[i + k] += near_[i] <= reach_squared_[i + k] ? 1 : 0;
+      }
+    }
+    for (std::size_t i = 0; i < size; ++i) {
+      // Infinite coordinates give infinite reaches; those of NaN compare false.
+      if (!(reach_squared_[i] <= std::numeric_limits<float>::max())) neighbors_[i] = kNotFinite;
     }
   }
 
@@ -111,7 +125,9 @@ class IsolatedReturnFilter : public pcl::FilterIndices<PointT> {
   float distance_ = 0.1F;
   float slope_ = 0.05F;
   std::vector<int> neighbors_;
-  std::vector<float> reach_squared_;
+  std::vector<float> x_, y_, z_;       // from the sensor [m]
+  std::vector<float> reach_squared_;   // [m^2]
+  std::vector<float> near_;            // squared distances to the k-th next [m^2]
 };
 
 }  // namespace tunnel_pilot::perception
