@@ -162,7 +162,7 @@ TunnelReason CenterlineEstimator::checkWidth(const std::optional<Pose>& pose) {
   if (pose && !memory_.empty()) {
     const Point place = pose->transform(measured_.front().position);
     for (const Node& node : memory_) {
-      if ((node.position - place).norm() < kSeenComing) jump = std::min(jump, std::abs(width - node.width));
+      if ((node.position - place).squaredNorm() < kSeenComing * kSeenComing) jump = std::min(jump, std::abs(width - node.width));
     }
   }
   if (jump > parameters_.width_jump_max && ++jumps_ < parameters_.jump_scans) return TunnelReason::kWidthJump;

@@ -7,12 +7,16 @@
 namespace tunnel_pilot::perception {
 namespace {
 
-// P <- F P F' with F = [1 l l^2/2 0; 0 1 l 0; 0 0 1 0; 0 0 0 1], the transition over length l.
-CorridorSmoother::Matrix transition(double l) {
-  CorridorSmoother::Matrix f = CorridorSmoother::Matrix::Identity();
-  f(0, 1) = f(1, 2) = l;
-  f(0, 2) = 0.5 * l * l;
-  return f;
+// The transition over length l is F = [1 l l^2/2 0; 0 1 l 0; 0 0 1 0; 0 0 0 1]. P <- P F': by columns.
+void timesTransposedTransition(double l, CorridorSmoother::Matrix& p) {
+  p.col(0) += l * p.col(1) + 0.5 * l * l * p.col(2);
+  p.col(1) += l * p.col(2);
+}
+
+// P <- F P: by rows.
+void transitionTimes(double l, CorridorSmoother::Matrix& p) {
+  p.row(0) += l * p.row(1) + 0.5 * l * l * p.row(2);
+  p.row(1) += l * p.row(2);
 }
 
 }  // namespace
@@ -28,12 +32,13 @@ void CorridorSmoother::start(const CorridorNode& node, const Vector& deviations)
 
 void CorridorSmoother::advance(double length) {
   const Step& from = steps_.back();
-  const Matrix f = transition(length);
   Step to;
   to.length = length;
   to.predicted = from.node;
   to.predicted.move(length);
-  to.predicted_covariance = f * from.covariance * f.transpose();
+  to.predicted_covariance = from.covariance;
+  timesTransposedTransition(length, to.predicted_covariance);
+  transitionTimes(length, to.predicted_covariance);
   // White noise of curvature's rate, integrated over the step (e, psi, kappa).
   const double l = length;
   const double q = curvature_noise_;
@@ -98,8 +103,9 @@ void CorridorSmoother::smooth() {
   for (std::size_t i = steps_.size() - 1; i-- > 0;) {
     Step& step = steps_[i];
     const Step& next = steps_[i + 1];
-    const Matrix f = transition(next.length);
-    const Matrix gain = step.covariance * f.transpose() * next.predicted_covariance.inverse();
+    Matrix cross = step.covariance;
+    timesTransposedTransition(next.length, cross);
+    const Matrix gain = cross * next.predicted_covariance.inverse();
     const CorridorNode& expected = next.predicted;
     const Vector correction((next.node.position - expected.position).dot(expected.direction.left()),
                             next.node.direction.angle() - expected.direction.angle(),

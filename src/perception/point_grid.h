@@ -10,7 +10,7 @@
 
 namespace tunnel_pilot::perception {
 
-/// Neighbouring returns averaged into one.
+/// Neighbouring returns, represented by the first.
 struct PointGroup {
   float x = 0.0F;  ///< [m]
   float y = 0.0F;  ///< [m]

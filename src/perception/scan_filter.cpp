@@ -16,6 +16,7 @@ constexpr double kNetworkFirst = -95.0 * kDegree;
 constexpr double kNetworkIncrement = 0.25 * kDegree;
 constexpr double kNeededView = 90.0 * kDegree;  // either side
 constexpr double kSideSector = 30.0 * kDegree;  // from here to kNeededView
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
 bool sameBytes(const std::vector<float>& a, const std::vector<float>& b) {
@@ -28,8 +29,8 @@ bool wellFormed(const geometry::Scan& scan) {
          scan.range_max > scan.range_min;
 }
 
-int sectorOf(double angle) {
-  if (std::abs(angle) > kNeededView) return -1;
+std::uint8_t sectorOf(double angle) {
+  if (std::abs(angle) > kNeededView) return 3;
   if (angle > kSideSector) return 0;
   return angle < -kSideSector ? 2 : 1;
 }
@@ -77,19 +78,19 @@ void ScanFilter::reset() {
 const ScanFilter::Result& ScanFilter::filter(const geometry::Scan& scan,
                                              const geometry::Pose& sensor_in_base, Stamp now) {
   if (result_.points.use_count() > 1) result_.points.reset(new pcl::PointCloud<pcl::PointXYZ>);
-  result_.points->clear();
   result_.valid_fraction = {};
   result_.rejection = check(scan, sensor_in_base, now);
   result_.accepted = result_.rejection == Rejection::kNone;
   ++counts_[static_cast<std::size_t>(result_.rejection)];
   if (!result_.accepted) {
+    result_.points->clear();
     result_.network_scan.ranges.clear();
     return result_;
   }
   last_stamp_ = scan.stamp;
   makeCloud(scan);
   gatherPoints();
-  measureSectors();
+  measureSectors(scan);
   makeNetworkScan(scan);
   return result_;
 }
@@ -176,21 +177,22 @@ void ScanFilter::adopt(const geometry::Scan& scan, const geometry::Pose& sensor)
     const double angle = scan.angle(i) + sensor.heading;
     cosines_[i] = static_cast<float>(std::cos(angle));
     sines_[i] = static_cast<float>(std::sin(angle));
-    const int sector = sectorOf(angle);
-    sectors_[i] = static_cast<signed char>(sector);
-    if (sector >= 0) ++sector_sizes_[static_cast<std::size_t>(sector)];
+    sectors_[i] = sectorOf(angle);
+    if (sectors_[i] < sector_sizes_.size()) ++sector_sizes_[sectors_[i]];
   }
   adoptSources(scan.angle_min + sensor.heading, scan.angle_increment, static_cast<int>(size));
 }
 
 void ScanFilter::adoptSources(double angle_min, double angle_increment, int size) {
   sources_.resize(kNetworkBeams);
+  same_beams_ = size == kNetworkBeams;
   for (int i = 0; i < kNetworkBeams; ++i) {
     double at = (kNetworkFirst + i * kNetworkIncrement - angle_min) / angle_increment;
     if (std::abs(at - std::round(at)) < 1e-3) at = std::round(at);
     const int first = std::min(static_cast<int>(std::floor(at)), size - 2);
     const bool seen = at >= 0.0 && at <= size - 1;
     sources_[static_cast<std::size_t>(i)] = {seen ? first : -1, static_cast<float>(at - first)};
+    same_beams_ = same_beams_ && at == i;
   }
 }
 
@@ -203,11 +205,9 @@ void ScanFilter::makeCloud(const geometry::Scan& scan) {
   beams_->resize(size);
   beams_->is_dense = false;
   beams_->sensor_origin_ = Eigen::Vector4f(x0, y0, 0.0F, 1.0F);
-  clean_.resize(size);
   for (std::size_t i = 0; i < size; ++i) {
     const float range = scan.ranges[i];
     const float r = range >= low && range <= high ? range : kNan;
-    clean_[i] = r;
     pcl::PointXYZ& p = beams_->points[i];
     p.x = x0 + r * cosines_[i];
     p.y = y0 + r * sines_[i];
@@ -227,19 +227,16 @@ void ScanFilter::gatherPoints() {
   points.sensor_origin_ = beams_->sensor_origin_;
 }
 
-void ScanFilter::measureSectors() {
-  std::array<int, 3> valid{};
-  std::size_t k = 0;
-  for (std::size_t i = 0; i < clean_.size(); ++i) {
-    const bool stays = k < kept_.size() && kept_[k] == static_cast<int>(i);
-    if (!stays) {
-      clean_[i] = std::isnan(clean_[i]) ? clean_[i] : kNan;
-      continue;
-    }
-    ++k;
-    if (sectors_[i] >= 0) ++valid[static_cast<std::size_t>(sectors_[i])];
+// Ranges of the beams whose return stayed, NaN for the others, and what share they are of each sector.
+void ScanFilter::measureSectors(const geometry::Scan& scan) {
+  std::array<int, 4> valid{};  // the last counts beams of no sector
+  clean_.assign(scan.ranges.size(), kNan);
+  for (const int beam : kept_) {
+    const auto i = static_cast<std::size_t>(beam);
+    clean_[i] = scan.ranges[i];
+    ++valid[sectors_[i]];
   }
-  for (std::size_t s = 0; s < valid.size(); ++s) {
+  for (std::size_t s = 0; s < sector_sizes_.size(); ++s) {
     result_.valid_fraction[s] = sector_sizes_[s] > 0 ? double(valid[s]) / sector_sizes_[s] : 0.0;
   }
 }
@@ -253,25 +250,34 @@ void ScanFilter::makeNetworkScan(const geometry::Scan& scan) {
   out.time_increment = scan.time_increment * kNetworkIncrement / scan.angle_increment;
   out.range_min = std::max(parameters_.range_min, scan.range_min);
   out.range_max = std::min(parameters_.range_max, scan.range_max);
-  out.ranges.resize(kNetworkBeams);
+  // A beam without a return keeps what it says: nothing there, or nothing known.
+  for (std::size_t i = 0; i < clean_.size(); ++i) {
+    const bool nothing = scan.ranges[i] > std::numeric_limits<float>::max();
+    clean_[i] = nothing ? kInfinity : clean_[i];
+  }
+  if (same_beams_) {
+    out.ranges = clean_;
+  } else {
+    resample(out.ranges);
+  }
+  fillGaps(out.ranges);
+}
+
+void ScanFilter::resample(std::vector<float>& ranges) const {
+  ranges.resize(kNetworkBeams);
   for (std::size_t i = 0; i < kNetworkBeams; ++i) {
     const Source source = sources_[i];
     if (source.first < 0) {
-      out.ranges[i] = kNan;
+      ranges[i] = kNan;
       continue;
     }
     const auto a = static_cast<std::size_t>(source.first);
-    const std::size_t nearest = source.fraction < 0.5F ? a : a + 1;
     const float ra = clean_[a];
     const float rb = clean_[a + 1];
     // Between two beams on one surface the range is interpolated; over an edge it is the nearer beam's.
-    const bool one_surface = std::abs(ra - rb) <= 0.1F * (ra + rb);
-    out.ranges[i] = one_surface ? ra + source.fraction * (rb - ra) : clean_[nearest];
-    if (std::isnan(out.ranges[i]) && scan.ranges[nearest] > std::numeric_limits<float>::max()) {
-      out.ranges[i] = std::numeric_limits<float>::infinity();
-    }
+    const bool one_surface = std::abs(ra - rb) <= 0.1F * (ra + rb) && ra < kInfinity;
+    ranges[i] = one_surface ? ra + source.fraction * (rb - ra) : (source.fraction < 0.5F ? ra : rb);
   }
-  fillGaps(out.ranges);
 }
 
 void ScanFilter::fillGaps(std::vector<float>& ranges) const {

@@ -29,7 +29,8 @@ constexpr double kCurveSpacing = 0.5;  // [m] of the fitted curves' samples
 // the worse, both walls do.
 constexpr double kTrackedSupport = 0.6;
 constexpr double kPairedSupport = 0.35;
-constexpr int kUnpairedScansMax = 150;
+constexpr int kScansToRevise = 10;       // with one wall alone
+constexpr double kRevisionMargin = 0.05;
 constexpr double kWidthDeviationMin = 0.03;  // [m] of the last scan's half width
 constexpr double kWidthDeviationMax = 0.10;  // [m]
 constexpr Stamp kGuessAge = std::chrono::milliseconds(500);
@@ -86,6 +87,7 @@ struct WallSegmentation::Impl {
     double better = 0.0;
     double worse = 0.0;
     bool left_better = true;
+    double total = 0.0;  // of all slices on both sides
   };
 
   explicit Impl(const WallSegmentationParameters& parameters)
@@ -119,6 +121,8 @@ struct WallSegmentation::Impl {
   void find(Stamp stamp);
   CorridorNode startOf(const CorridorSeed& seed) const;
   void follow(const CorridorNode& start, const CorridorSmoother::Vector& deviations, bool left, bool right);
+  bool vote(double to_beat);
+  void followSeed(const CorridorSeed& seed);
   bool followGuess(Stamp stamp);
   void keepGuess(Stamp stamp, const Walls& walls);
   void clear();
@@ -171,69 +175,83 @@ const Walls& WallSegmentation::segment(Stamp stamp) {
   return walls_;
 }
 
+// Walks along the returns and begins a group wherever one is farther than `spacing` from the last beginning.
 void WallSegmentation::Impl::group(const pcl::PointCloud<pcl::PointXYZ>& cloud,
                                    const std::vector<int>& indices) {
   const auto reach_squared = static_cast<float>(square(p.spacing));
   groups.clear();
-  order.clear();
-  float x0 = 0.0F;
+  order.resize(indices.size());
+  int count = 0;
+  float x0 = std::numeric_limits<float>::max();  // so that the first is far from it
   float y0 = 0.0F;
-  PointGroup sum;
-  const auto close = [&] {
-    const auto count = static_cast<float>(sum.last - sum.first);
-    if (sum.last > sum.first) groups.push_back({sum.x / count, sum.y / count, sum.first, sum.last});
-  };
   for (const int index : indices) {
     const pcl::PointXYZ& point = cloud.points[static_cast<std::size_t>(index)];
-    if (!std::isfinite(point.x) || !std::isfinite(point.y)) continue;
-    const int at = static_cast<int>(order.size());
-    order.push_back(index);
     const float dx = point.x - x0;
     const float dy = point.y - y0;
-    if (at == sum.first || dx * dx + dy * dy > reach_squared) {
-      close();
-      sum = {0.0F, 0.0F, at, at};
+    const float gap_squared = dx * dx + dy * dy;
+    if (gap_squared != gap_squared) continue;  // a coordinate is NaN
+    if (gap_squared > reach_squared) {
+      if (!std::isfinite(point.x) || !std::isfinite(point.y)) continue;
       x0 = point.x;
       y0 = point.y;
+      groups.push_back({x0, y0, count, count});
     }
-    sum.x += point.x;
-    sum.y += point.y;
-    sum.last = at + 1;
+    order[static_cast<std::size_t>(count++)] = index;
+    groups.back().last = count;
   }
-  close();
+  order.resize(static_cast<std::size_t>(count));
 }
 
 // The last scan's tunnel is the best first guess: beside a parked vehicle or an opening one wall shows where
-// the other still is, and a vote would take the vehicle for it. Where the guess does not hold, or has held
-// on to one wall for long, the near returns vote.
+// the other still is, and a vote would take the vehicle for it. Where the guess does not hold, or now and
+// then while it holds on to one wall, the returns vote; the guess stays unless the vote explains more.
 void WallSegmentation::Impl::find(Stamp stamp) {
   grid.fill(groups);
-  const bool tracked = followGuess(stamp);
-  guess_held = tracked;
-  Support tracked_support;
-  if (tracked) {
-    tracked_support = support();
-    const bool paired = tracked_support.worse >= kPairedSupport;
-    unpaired_scans = paired ? 0 : unpaired_scans + 1;
-    if (tracked_support.better >= kTrackedSupport && unpaired_scans < kUnpairedScansMax) return;
+  guess_held = followGuess(stamp);
+  double to_beat = 0.0;
+  if (guess_held) {
+    const Support held = support();
+    unpaired_scans = held.worse >= kPairedSupport ? 0 : unpaired_scans + 1;
+    const bool revise = unpaired_scans > 0 && unpaired_scans % kScansToRevise == 0;
+    if (held.better >= kTrackedSupport && !revise) return;
+    to_beat = held.total + kRevisionMargin;
   }
-  const std::optional<CorridorSeed> seed = seeder.find(groups);
-  if (seed) {
-    const bool paired = seed->left && seed->right;
-    follow(startOf(*seed), {0.3, 0.15, 0.05, paired ? 0.3 : 1e-3}, seed->left.has_value(),
-           seed->right.has_value());
-    const Support voted = support();
-    if (voted.better + voted.worse > tracked_support.better + tracked_support.worse) {
-      unpaired_scans = 0;
-      guess_held = false;
-      return;
-    }
-  }
-  if (tracked) {
+  if (vote(to_beat)) {
+    guess_held = false;
+    unpaired_scans = 0;
+  } else if (guess_held) {
     followGuess(stamp);
-  } else if (!seed) {
+  } else {
     clear();
   }
+}
+
+// Follows the walls that near returns vote for, or those that returns farther ahead vote for along the same
+// arc (beside a bay its back gets the near votes), whichever explain more. False, with the walls in any
+// state, when neither explains more than `to_beat`.
+bool WallSegmentation::Impl::vote(double to_beat) {
+  const std::optional<CorridorSeed> near = seeder.find(groups);
+  if (!near) return false;
+  const Direction direction(near->heading);
+  const SliceFrame origin = {0.0F, 0.0F, static_cast<float>(direction.cosine()),
+                             static_cast<float>(direction.sine())};
+  CorridorSeed far = seeder.findAlong(groups, origin, near->curvature, p.lookahead);
+  far.heading = near->heading;
+  followSeed(*near);
+  const double near_total = support().total;
+  double far_total = 0.0;
+  if (far.left && far.right) {
+    followSeed(far);
+    far_total = support().total;
+  }
+  if (far_total <= near_total) followSeed(*near);
+  return std::max(near_total, far_total) > to_beat;
+}
+
+void WallSegmentation::Impl::followSeed(const CorridorSeed& seed) {
+  const bool paired = seed.left && seed.right;
+  follow(startOf(seed), {0.3, 0.15, 0.05, paired ? 0.3 : 1e-3}, seed.left.has_value(),
+         seed.right.has_value());
 }
 
 bool WallSegmentation::Impl::followGuess(Stamp stamp) {
@@ -280,7 +298,13 @@ WallSegmentation::Impl::Support WallSegmentation::Impl::support() const {
     for (std::size_t i = first; i < std::min(first + near, slices.size()); ++i) count += slices[i];
     share[side] = count / static_cast<double>(near);
   }
-  return {std::max(share[0], share[1]), std::min(share[0], share[1]), share[0] >= share[1]};
+  double total = 0.0;
+  for (const std::vector<float>& slices : seen) {
+    for (const float slice : slices) total += slice;
+  }
+  const double slices_ahead = 2.0 * (p.lookahead + p.look_behind) / p.step;
+  return {std::max(share[0], share[1]), std::min(share[0], share[1]), share[0] >= share[1],
+          total / slices_ahead};
 }
 
 CorridorNode WallSegmentation::Impl::startOf(const CorridorSeed& seed) const {
@@ -376,23 +400,28 @@ WallSlice WallSegmentation::Impl::lookForWall(std::size_t side, double gate, con
   const double middle = kSides[side] * node.half_width;
   std::vector<std::int8_t>& mine = taken[side];
   const auto at = static_cast<std::int8_t>(smoother.size() - 1);
-  WallSlice slice;
+  int count = 0;
+  float sum_along = 0.0F;
+  float sum_along_squared = 0.0F;
+  float sum_lateral = 0.0F;
   float nearest = std::numeric_limits<float>::max();
   float farthest = std::numeric_limits<float>::lowest();
   grid.visitSlice(groups, frame, 0.5 * p.step, middle - gate, middle + gate,
                   [&](int group, float along, float lateral) {
                     nearest = std::min(nearest, along);
                     farthest = std::max(farthest, along);
-                    slice.mean.along += along;
-                    slice.mean.along_squared += along * along;
-                    slice.mean.lateral += lateral;
-                    ++slice.groups;
+                    sum_along += along;
+                    sum_along_squared += along * along;
+                    sum_lateral += lateral;
+                    ++count;
                     mine[static_cast<std::size_t>(group)] = at;
                   });
-  if (slice.groups == 0) return slice;
-  slice.mean.along /= slice.groups;
-  slice.mean.along_squared /= slice.groups;
-  slice.mean.lateral /= slice.groups;
+  WallSlice slice;
+  if (count == 0) return slice;
+  slice.groups = count;
+  slice.mean.along = sum_along / static_cast<float>(count);
+  slice.mean.along_squared = sum_along_squared / static_cast<float>(count);
+  slice.mean.lateral = sum_lateral / static_cast<float>(count);
   slice.coverage = std::clamp((farthest - nearest) / p.step, kCoverageMin, 1.0);
   slice.outward = kSides[side] * slice.mean.lateral - node.half_width;
   return slice;

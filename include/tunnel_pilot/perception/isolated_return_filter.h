@@ -62,21 +62,25 @@ class IsolatedReturnFilter : public pcl::FilterIndices<PointT> {
 
   void applyFilter(std::vector<int>& kept) override {
     countNeighbors();
-    kept.clear();
-    this->removed_indices_->clear();
     const std::vector<int>& order = *this->indices_;
+    kept.resize(order.size());
+    std::size_t count = 0;
     for (std::size_t i = 0; i < order.size(); ++i) {
-      const bool stays = (neighbors_[i] >= min_neighbors_) != this->negative_;
-      if (stays) {
-        kept.push_back(order[i]);
-      } else if (this->extract_removed_indices_) {
-        this->removed_indices_->push_back(order[i]);
-      }
+      kept[count] = order[i];
+      count += stays(i) ? 1 : 0;
+    }
+    kept.resize(count);
+    this->removed_indices_->clear();
+    if (!this->extract_removed_indices_) return;
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      if (!stays(i)) this->removed_indices_->push_back(order[i]);
     }
   }
 
  private:
   static constexpr int kNotFinite = -1;
+
+  bool stays(std::size_t i) const { return (neighbors_[i] >= min_neighbors_) != this->negative_; }
 
   // Coordinates as arrays, so that the compiler may work on several points at once; comparisons with the
   // NaN of a point that is not finite are false, so it is nobody's neighbour.
@@ -103,15 +107,21 @@ class IsolatedReturnFilter : public pcl::FilterIndices<PointT> {
     neighbors_.assign(size, 0);
     for (std::size_t k = 1; k <= static_cast<std::size_t>(window_) && k < size; ++k) {
       near_.resize(size - k);
+      const float* x = x_.data();
+      const float* y = y_.data();
+      const float* z = z_.data();
+      const float* reach = reach_squared_.data();
+      float* near = near_.data();
+      int* neighbors = neighbors_.data();
       for (std::size_t i = 0; i < size - k; ++i) {
-        const float dx = x_[i + k] - x_[i];
-        const float dy = y_[i + k] - y_[i];
-        const float dz = z_[i + k] - z_[i];
-        near_[i] = dx * dx + dy * dy + dz * dz;
+        const float dx = x[i + k] - x[i];
+        const float dy = y[i + k] - y[i];
+        const float dz = z[i + k] - z[i];
+        near[i] = dx * dx + dy * dy + dz * dz;
       }
-      for (std::size_t i = 0; i < size - k; ++i) neighbors_[i] += near_[i] <= reach_squared_[i] ? 1 : 0;
+      for (std::size_t i = 0; i < size - k; ++i) neighbors[i] += static_cast<int>(near[i] <= reach[i]);
       for (std::size_t i = 0; i < size - k; ++i) {
-        neighbors_[i + k] += near_[i] <= reach_squared_[i + k] ? 1 : 0;
+        neighbors[i + k] += static_cast<int>(near[i] <= reach[i + k]);
       }
     }
     for (std::size_t i = 0; i < size; ++i) {

@@ -92,7 +92,6 @@ class ScanFilter {
   std::uint64_t count(Rejection rejection) const { return counts_[static_cast<std::size_t>(rejection)]; }
 
  private:
-  struct Announced;
   // What a network beam is made from: source beams `first` and `first + 1` and the way between them.
   struct Source {
     int first;  // -1: outside the view
@@ -107,8 +106,9 @@ class ScanFilter {
   void adoptSources(double angle_min, double angle_increment, int size);
   void makeCloud(const geometry::Scan& scan);
   void gatherPoints();
-  void measureSectors();
+  void measureSectors(const geometry::Scan& scan);
   void makeNetworkScan(const geometry::Scan& scan);
+  void resample(std::vector<float>& ranges) const;
   void fillGaps(std::vector<float>& ranges) const;
 
   ScanFilterParameters parameters_;
@@ -121,9 +121,10 @@ class ScanFilter {
   geometry::Scan model_;           // of the first accepted scan; its ranges are the last scan's
   geometry::Pose sensor_;
   std::vector<float> cosines_, sines_;  // of the beams, in base_link
-  std::vector<signed char> sectors_;    // 0 left, 1 front, 2 right, -1 none
+  std::vector<std::uint8_t> sectors_;   // 0 left, 1 front, 2 right, 3 none
   std::array<int, 3> sector_sizes_{};
   std::vector<Source> sources_;
+  bool same_beams_ = false;             // the scan's beams are the network's
 
   std::optional<Stamp> last_stamp_;
   std::vector<float> last_ranges_;

@@ -17,7 +17,7 @@ struct WallSegmentationParameters {
   double lookahead = 0.0;            ///< how far ahead walls are followed, along the tunnel [m]
   double look_behind = 0.0;          ///< curves begin this far behind the cloud's origin [m]
   double step = 0.0;                 ///< length of a slice across the tunnel [m]
-  double spacing = 0.0;              ///< returns nearer to each other are averaged [m]
+  double spacing = 0.0;              ///< of returns nearer to each other one counts for all [m]
   double seed_radius = 0.0;          ///< the first guess looks at returns within this distance [m]
   double seed_heading_max = 0.0;     ///< largest heading error of the first guess [rad]
   double seed_curvature_max = 0.0;   ///< largest curvature of the first guess [1/m]
@@ -39,8 +39,8 @@ WallSegmentationParameters loadWallSegmentation(config::Node node);
 
 /// Finds the two walls of a tunnel in one planar scan, as a PCL algorithm: setInputCloud, setIndices, then
 /// segment(). The cloud's frame has the truck's reference point as origin, x ahead, y left, both walls'
-/// near ends beside or ahead of it; its points are best given in beam order (then neighbours are averaged
-/// before all else), but need not be.
+/// near ends beside or ahead of it; its points are best given in beam order (then one of near
+/// neighbours stands for all), but need not be.
 ///
 /// Both walls are taken as offset curves of one centerline. Along its arc length s the state
 ///     (e lateral offset, psi heading, kappa curvature, h half width)
