@@ -137,6 +137,7 @@ geometry::Scan scanOf(const sensor_msgs::LaserScan& message) {
   scan.stamp = stampOf(message.header);
   scan.angle_min = message.angle_min;
   scan.angle_increment = message.angle_increment;
+  scan.announced_angle_max = message.angle_max;
   scan.time_increment = message.time_increment;
   scan.range_min = message.range_min;
   scan.range_max = message.range_max;
