@@ -83,7 +83,6 @@ PreviewDriverParameters loadPreviewDriver(config::Node node) {
 PreviewDriver::PreviewDriver(const PreviewDriverParameters& parameters,
                              const vehicle::TruckGeometry& geometry)
     : parameters_(parameters),
-      geometry_(geometry),
       planner_(response(parameters, geometry), parameters.weights, parameters.step),
       yaw_(parameters.yaw, geometry) {}
 

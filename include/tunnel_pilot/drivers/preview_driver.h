@@ -82,7 +82,6 @@ class PreviewDriver {
   Stamp delay() const;  ///< from a command given to the valve's answer
 
   PreviewDriverParameters parameters_;
-  vehicle::TruckGeometry geometry_;
   PreviewPlanner planner_;
   YawObserver yaw_;
   MotionHistory history_;
