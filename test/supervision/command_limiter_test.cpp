@@ -78,10 +78,11 @@ TEST(CommandLimiter, LateralAccelerationIsLimitedWithTheHigherOfBothSpeeds) {
   // 8 m/s allow 2/64 1/m.
   const double widest = vehicle::steadyArticulation(truck(), 2.0 / 64.0);
   CommandLimiter measured_fast = at(widest, 2.0);
-  EXPECT_TRUE(measured_fast.limit({widest + 0.004, 2.0, 8.0, false}, kCycle).fired.lateral_acceleration);
+  const CommandLimiter::Result result = measured_fast.limit({widest + 0.004, 2.0, 8.0, false}, kCycle);
+  EXPECT_DOUBLE_EQ(result.articulation, widest);
+  EXPECT_TRUE(result.fired.lateral_acceleration);
   CommandLimiter commanded_fast = at(widest, 8.0);
-  EXPECT_TRUE(
-      commanded_fast.limit({widest + 0.004, 8.0, 2.0, false}, kCycle).fired.lateral_acceleration);
+  EXPECT_DOUBLE_EQ(commanded_fast.limit({widest + 0.004, 8.0, 2.0, false}, kCycle).articulation, widest);
   CommandLimiter slow = at(widest, 2.0);
   EXPECT_FALSE(slow.limit({widest + 0.004, 2.0, 2.0, false}, kCycle).fired.lateral_acceleration);
 }

@@ -94,6 +94,15 @@ TEST(Envelope, ATooNarrowPlaceEndsTheFreeDistanceAtTheWall) {
   EXPECT_NEAR(result.free_distance, 9.0 - check.truck.front_overhang, 1.0);
 }
 
+TEST(Envelope, ATooNarrowPlaceOnTheRightCountsAlike) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  for (auto& p : scene.walls.right.curve) {
+    if (p.x() > 9.0) p.y() += 0.9;
+  }
+  EXPECT_EQ(check.of(scene).free_until, Envelope::End::kWall);
+}
+
 TEST(Envelope, TheSmallestObstacleIsFoundAnywhereInTheCorridor) {
   for (const double x : {4.0, 7.0, 11.0}) {
     for (const double y : {-1.4, 0.0, 1.4}) {
