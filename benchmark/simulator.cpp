@@ -1,5 +1,5 @@
-// A step of the simulator (truck, exact scan of 761 beams, noise) beside one made of Box2D and the standard
-// library's normal distribution; and the closed loop against real time.
+// A step of the simulator (truck, exact scan of 761 beams, noise) beside one made of Box2D and the
+// standard library's normal distribution; and the closed loop against real time.
 
 #include <cmath>
 #include <cstdio>
@@ -25,9 +25,9 @@ using geometry::Pose;
 using world::WallChain;
 
 const std::string kPackage = TUNNEL_PILOT_SOURCE_DIR;
-constexpr double kStep = 0.01;          // [s]
-constexpr double kSpeed = 3.0;          // [m/s]
-constexpr int kStepsPerPlace = 60;      // then the truck is put to the next place
+constexpr double kStep = 0.01;      // [s]
+constexpr double kSpeed = 3.0;      // [m/s]
+constexpr int kStepsPerPlace = 60;  // then the truck is put to the next place
 constexpr std::uint64_t kSeed = 1000;
 
 // A winding drift 5 m wide of 400 wall segments, and places along its middle.
@@ -50,7 +50,8 @@ Drift makeDrift() {
   return drift;
 }
 
-// Kinematic truck, ray caster and lidar with all its errors, as the product's simulator puts them together.
+// Kinematic truck, ray caster and lidar with all its errors, as the product's simulator puts them
+// together.
 class OurCore {
  public:
   explicit OurCore(const Drift& drift)
@@ -68,9 +69,9 @@ class OurCore {
     }
     const Pose before = truck_.state().pose;
     truck_.step({0.05, 0.0}, {}, kStep);
-    const geometry::Scan& scan =
-        lidar_.sweep(caster_, before.compose(sensor_), truck_.state().pose.compose(sensor_),
-                     truck_parameters_.geometry.lidar_z, 0.0, fromSeconds(kStep * static_cast<double>(steps_)));
+    const geometry::Scan& scan = lidar_.sweep(
+        caster_, before.compose(sensor_), truck_.state().pose.compose(sensor_),
+        truck_parameters_.geometry.lidar_z, 0.0, fromSeconds(kStep * static_cast<double>(steps_)));
     ++steps_;
     return scan.ranges[380];
   }

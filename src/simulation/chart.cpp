@@ -4,11 +4,10 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
-#include <stdexcept>
-#include <utility>
-
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <stdexcept>
+#include <utility>
 
 namespace tunnel_pilot::simulation {
 namespace {
@@ -137,15 +136,16 @@ Chart::Frame Chart::frameFor(int width, int height) const {
 
 void Chart::drawAxes(cv::Mat& image, const Frame& frame) const {
   const cv::Rect& box = frame.box;
-  const double x_step = roundStep((frame.x_high - frame.x_low) * kTickTarget * kOversampling / box.width);
+  const double x_step =
+      roundStep((frame.x_high - frame.x_low) * kTickTarget * kOversampling / box.width);
   const double y_step =
       roundStep((frame.y_high - frame.y_low) * 0.4 * kTickTarget * kOversampling / box.height);
   for (double x = std::ceil(frame.x_low / x_step) * x_step; x <= frame.x_high; x += x_step) {
     const int column = static_cast<int>(std::lround(frame.x(x)));
     cv::line(image, {column, box.y}, {column, box.br().y}, colour::kGrid, kOversampling);
     const std::string text = tickText(x, x_step);
-    putText(image, text, column - 0.5 * textSize(text, kFontHeight).width, box.br().y + 18 * kOversampling,
-            kFontHeight, colour::kInk);
+    putText(image, text, column - 0.5 * textSize(text, kFontHeight).width,
+            box.br().y + 18 * kOversampling, kFontHeight, colour::kInk);
   }
   for (double y = std::ceil(frame.y_low / y_step) * y_step; y <= frame.y_high; y += y_step) {
     const int row = static_cast<int>(std::lround(frame.y(y)));

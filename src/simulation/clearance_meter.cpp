@@ -15,7 +15,8 @@ double cross(const Point& a, const Point& b) { return a.x() * b.y() - a.y() * b.
 double pointToSegment(const Point& p, const Point& a, const Point& b) {
   const Point along = b - a;
   const double length_squared = along.squaredNorm();
-  const double share = length_squared > 0.0 ? std::clamp((p - a).dot(along) / length_squared, 0.0, 1.0) : 0.0;
+  const double share =
+      length_squared > 0.0 ? std::clamp((p - a).dot(along) / length_squared, 0.0, 1.0) : 0.0;
   return (a + share * along - p).norm();
 }
 
@@ -78,7 +79,8 @@ double ClearanceMeter::clearance(const std::vector<Point>& outline) const {
   double nearest = std::numeric_limits<double>::infinity();
   const auto look = [&](const Chunk& chunk) {
     for (const Segment& segment : chunk.segments) {
-      if (!mayBeNearer(segment.circle.centre, body.centre, segment.circle.radius + body.radius, nearest)) continue;
+      if (!mayBeNearer(segment.circle.centre, body.centre, segment.circle.radius + body.radius, nearest))
+        continue;
       nearest = std::min(nearest, outlineToSegment(outline, segment.a, segment.b));
     }
   };
@@ -86,13 +88,14 @@ double ClearanceMeter::clearance(const std::vector<Point>& outline) const {
   const auto power = [&](const Chunk& chunk) {
     return (chunk.circle.centre - body.centre).squaredNorm() - chunk.circle.radius * chunk.circle.radius;
   };
-  const auto first = std::min_element(chunks_.begin(), chunks_.end(), [&](const Chunk& a, const Chunk& b) {
-    return power(a) < power(b);
-  });
+  const auto first =
+      std::min_element(chunks_.begin(), chunks_.end(),
+                       [&](const Chunk& a, const Chunk& b) { return power(a) < power(b); });
   if (first != chunks_.end()) look(*first);
   for (const Chunk& chunk : chunks_) {
     if (&chunk == &*first) continue;
-    if (mayBeNearer(chunk.circle.centre, body.centre, chunk.circle.radius + body.radius, nearest)) look(chunk);
+    if (mayBeNearer(chunk.circle.centre, body.centre, chunk.circle.radius + body.radius, nearest))
+      look(chunk);
   }
   return nearest;
 }

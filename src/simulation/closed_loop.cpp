@@ -20,8 +20,8 @@ ClosedLoop::ClosedLoop(const Scenario& scenario, const Setup& setup, const Pilot
       truck_side_(hub_.connect()),
       pilot_side_(hub_.connect()),
       simulator_(setup.simulator, setup.truck_controller, setup.truck,
-                 makePlant(scenario.plant, setup.truck, seed), scenario.plant.load, std::move(world), seed,
-                 *truck_side_),
+                 makePlant(scenario.plant, setup.truck, seed), scenario.plant.load, std::move(world),
+                 seed, *truck_side_),
       pilot_(pilot, setup.truck, *pilot_side_) {}
 
 void ClosedLoop::step() {

@@ -18,7 +18,8 @@ namespace {
 // The world an experiment drives in; empty for those without.
 std::string worldOf(const Experiment& experiment) {
   if (const auto* drive = std::get_if<DriveExperiment>(&experiment)) return drive->world_file;
-  if (const auto* perception = std::get_if<PerceptionExperiment>(&experiment)) return perception->world_file;
+  if (const auto* perception = std::get_if<PerceptionExperiment>(&experiment))
+    return perception->world_file;
   return "";
 }
 
@@ -49,11 +50,12 @@ EpisodeResult runExperiment(const Scenario& scenario, const Setup& setup, const 
 
 }  // namespace
 
-std::unique_ptr<vehicle::Plant> makePlant(const PlantChoice& choice, const vehicle::TruckParameters& truck,
-                                          std::uint64_t seed) {
+std::unique_ptr<vehicle::Plant> makePlant(const PlantChoice& choice,
+                                          const vehicle::TruckParameters& truck, std::uint64_t seed) {
   const vehicle::TruckParameters parameters =
       vehicle::varied(truck, streamSeed(seed, Stream::kPlantVariation), choice.variation);
-  if (choice.model == PlantModel::kKinematic) return std::make_unique<vehicle::KinematicTruck>(parameters);
+  if (choice.model == PlantModel::kKinematic)
+    return std::make_unique<vehicle::KinematicTruck>(parameters);
   vehicle::DynamicTruckOptions options;
   options.load = choice.load;
   options.rough_road = choice.rough_road;

@@ -69,8 +69,8 @@ std::vector<Point> linePoints(const geometry::Path& line) {
   return points;
 }
 
-cv::Mat topView(const EpisodeResult& episode, const vehicle::TruckGeometry& truck, const std::string& title,
-                bool swept) {
+cv::Mat topView(const EpisodeResult& episode, const vehicle::TruckGeometry& truck,
+                const std::string& title, bool swept) {
   Chart chart(title, "x [m]", "y [m]");
   chart.equalAxes();
   if (swept) addSwept(chart, episode.track, truck);
@@ -78,10 +78,13 @@ cv::Mat topView(const EpisodeResult& episode, const vehicle::TruckGeometry& truc
     chart.line(episode.walls[i], colour::kInk, i == 0 ? "walls" : "", 1.6);
   }
   if (!episode.line.empty()) chart.line(linePoints(episode.line), colour::kGrey, "reference line", 1.0);
-  chart.line(curve(episode.track, [](const auto& s) { return s.rear.x; }, [](const auto& s) { return s.rear.y; }),
-             colour::kOrange, "rear axle", 1.2);
-  chart.line(curve(episode.track, [](const auto& s) { return s.front.x; },
-                   [](const auto& s) { return s.front.y; }),
+  chart.line(
+      curve(
+          episode.track, [](const auto& s) { return s.rear.x; }, [](const auto& s) { return s.rear.y; }),
+      colour::kOrange, "rear axle", 1.2);
+  chart.line(curve(
+                 episode.track, [](const auto& s) { return s.front.x; },
+                 [](const auto& s) { return s.front.y; }),
              colour::kBlue, "front axle", 1.2);
   if (!episode.track.empty()) addTruck(chart, episode.track.back(), truck);
   // As high as the way's shape asks for.
@@ -100,20 +103,22 @@ cv::Mat articulationStrip(const std::vector<TrackSample>& track) {
   Chart chart("Articulation", "distance along the line [m]", "angle [deg]");
   chart.line(curve(track, station, [](const auto& s) { return s.articulation_command * kDegrees; }),
              colour::kOrange, "demanded", 1.4);
-  chart.line(curve(track, station, [](const auto& s) { return s.articulation * kDegrees; }), colour::kBlue,
-             "reached", 1.4);
+  chart.line(curve(track, station, [](const auto& s) { return s.articulation * kDegrees; }),
+             colour::kBlue, "reached", 1.4);
   chart.includeY(-5.0, 5.0);
   return chart.draw(kWidth, kStripHeight);
 }
 
 cv::Mat offsetStrip(const std::vector<TrackSample>& track) {
-  return strip(track, "Lateral offset of the front axle, left positive", "offset [m]",
-               [](const auto& s) { return s.lateral_offset; }, 0.1);
+  return strip(
+      track, "Lateral offset of the front axle, left positive", "offset [m]",
+      [](const auto& s) { return s.lateral_offset; }, 0.1);
 }
 
 cv::Mat headingStrip(const std::vector<TrackSample>& track) {
-  return strip(track, "Heading error", "heading [deg]",
-               [](const auto& s) { return s.heading_error * kDegrees; }, 1.0);
+  return strip(
+      track, "Heading error", "heading [deg]", [](const auto& s) { return s.heading_error * kDegrees; },
+      1.0);
 }
 
 void plotDrive(const std::string& file, const std::string& title, const EpisodeResult& episode,
@@ -122,8 +127,10 @@ void plotDrive(const std::string& file, const std::string& title, const EpisodeR
   Chart speed("Speed", "distance along the line [m]", "speed [m/s]");
   speed.line(curve(track, station, [](const auto& s) { return s.speed; }), colour::kBlue, "", 1.6);
   speed.includeY(0.0, 1.0);
-  Chart clearance("Clearance of either body to the walls", "distance along the line [m]", "clearance [m]");
-  clearance.line(curve(track, station, [](const auto& s) { return s.clearance; }), colour::kBlue, "", 1.6);
+  Chart clearance("Clearance of either body to the walls", "distance along the line [m]",
+                  "clearance [m]");
+  clearance.line(curve(track, station, [](const auto& s) { return s.clearance; }), colour::kBlue, "",
+                 1.6);
   clearance.line({{track.front().station, 0.2}, {track.back().station, 0.2}}, colour::kRed,
                  "envelope margin 0.20 m", 1.2);
   clearance.includeY(0.0, 0.5);
@@ -145,8 +152,8 @@ void plotSteadyTurn(const std::string& file, const std::string& title, const Epi
   }
   yaw.line(turned, colour::kBlue);
   Chart acceleration("Lateral acceleration", "time [s]", "a_y [m/s2]");
-  acceleration.line(curve(track, time, [](const auto& s) { return s.lateral_acceleration; }), colour::kBlue,
-                    "", 1.2);
+  acceleration.line(curve(track, time, [](const auto& s) { return s.lateral_acceleration; }),
+                    colour::kBlue, "", 1.2);
   acceleration.includeY(0.0, 0.5);
   writePng(file, {topView(episode, truck, title, false), yaw.draw(kWidth, 320),
                   acceleration.draw(kWidth, kStripHeight)});
@@ -176,12 +183,13 @@ void plotPerception(const std::string& file, const std::string& title, const Epi
   std::vector<Point> curvature;
   for (const PerceptionSample& s : episode.perception) curvature.emplace_back(s.station, s.curvature);
   bend.line(std::move(curvature), colour::kOrange, "", 1.6);
-  writePng(file, {topView(episode, truck, title, false), bend.draw(kWidth, kStripHeight),
-                  errors("Heading: measured less true", "error [deg]", kDegrees,
-                         &PerceptionSample::heading_error, 2.0),
-                  errors("Lateral offset: measured less true", "error [m]", 1.0,
-                         &PerceptionSample::offset_error, 0.05),
-                  errors("Width: measured less true", "error [m]", 1.0, &PerceptionSample::width_error, 0.1)});
+  writePng(file,
+           {topView(episode, truck, title, false), bend.draw(kWidth, kStripHeight),
+            errors("Heading: measured less true", "error [deg]", kDegrees,
+                   &PerceptionSample::heading_error, 2.0),
+            errors("Lateral offset: measured less true", "error [m]", 1.0,
+                   &PerceptionSample::offset_error, 0.05),
+            errors("Width: measured less true", "error [m]", 1.0, &PerceptionSample::width_error, 0.1)});
 }
 
 }  // namespace
@@ -190,7 +198,8 @@ void plotEpisode(const std::string& file, const Scenario& scenario, const Episod
                  const vehicle::TruckGeometry& truck) {
   if (episode.track.empty()) return;
   const std::string title = scenario.name + ", " + episode.label();
-  if (std::holds_alternative<DriveExperiment>(scenario.experiment)) plotDrive(file, title, episode, truck);
+  if (std::holds_alternative<DriveExperiment>(scenario.experiment))
+    plotDrive(file, title, episode, truck);
   if (std::holds_alternative<SteadyTurnExperiment>(scenario.experiment)) {
     plotSteadyTurn(file, title, episode, truck);
   }

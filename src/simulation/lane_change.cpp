@@ -6,11 +6,11 @@
 namespace tunnel_pilot::simulation {
 namespace {
 
-constexpr double kBehind = 5.0;         // sensed path begins so far behind the truck [m]
-constexpr double kAhead = 40.0;         // full preview [m]
-constexpr double kSpacing = 0.5;        // [m]
-constexpr double kNominalWidth = 9.0;   // a haul road's, told for completeness [m]
-constexpr double kUnlimited = 100.0;    // the speed is fixed: the governor has no say
+constexpr double kBehind = 5.0;        // sensed path begins so far behind the truck [m]
+constexpr double kAhead = 40.0;        // full preview [m]
+constexpr double kSpacing = 0.5;       // [m]
+constexpr double kNominalWidth = 9.0;  // a haul road's, told for completeness [m]
+constexpr double kUnlimited = 100.0;   // the speed is fixed: the governor has no say
 
 PilotParameters withFixedSpeed(PilotParameters parameters, double speed) {
   parameters.preview_driver.speed = speed;
@@ -102,8 +102,8 @@ class LaneChange : public ClosedLoop {
     for (double s = -kBehind; s <= kAhead; s += kSpacing) {
       geometry::PathPoint point = prolongedAt(line, station + s);
       const geometry::Point local = pose.inverseTransform({point.x, point.y});
-      points.push_back({s + kBehind, local.x(), local.y(), geometry::wrapAngle(point.heading - pose.heading),
-                        point.curvature});
+      points.push_back({s + kBehind, local.x(), local.y(),
+                        geometry::wrapAngle(point.heading - pose.heading), point.curvature});
     }
     return geometry::Path(std::move(points));
   }

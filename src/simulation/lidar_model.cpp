@@ -61,7 +61,9 @@ world::RayCaster::Beams LidarModel::beams(const LidarParameters& parameters) {
 }
 
 LidarModel::LidarModel(const LidarParameters& parameters, std::uint64_t seed)
-    : parameters_(parameters), noise_(seed, Stream::kLidar), dust_(seed, Stream::kDust),
+    : parameters_(parameters),
+      noise_(seed, Stream::kLidar),
+      dust_(seed, Stream::kDust),
       burst_end_(Stamp::min()) {
   bias_ = noise_.uniform(-parameters.range_bias_max, parameters.range_bias_max);
   static const std::vector<double> levels = normalLevels(std::size_t{1} << kErrorBits);

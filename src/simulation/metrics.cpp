@@ -98,7 +98,8 @@ std::string classOfBend(double curvature) {
 
 bool isMetric(const std::string& key) {
   const auto& texts = metricTexts();
-  return std::any_of(texts.begin(), texts.end(), [&](const MetricText& text) { return text.key == key; });
+  return std::any_of(texts.begin(), texts.end(),
+                     [&](const MetricText& text) { return text.key == key; });
 }
 
 const MetricText& metricText(const std::string& key) {
@@ -120,7 +121,8 @@ double quantile(std::vector<double> values, double share) {
 
 Metrics driveMetrics(const std::vector<TrackSample>& track, const geometry::Path& line) {
   Moments lateral, heading, heading_straight, speed;
-  std::map<int, Moments> hinge;  // by straight: each has a mean of its own, by the sensor's bias and slip
+  std::map<int, Moments>
+      hinge;  // by straight: each has a mean of its own, by the sensor's bias and slip
   double clearance = std::numeric_limits<double>::infinity();
   bool settled = false;
   int straight = 0;

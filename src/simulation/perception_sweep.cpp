@@ -119,16 +119,17 @@ EpisodeResult runPerception(const PerceptionExperiment& experiment, const Scenar
     const Truth truth = weave.at(station, stamp);
     const geometry::Pose later =
         weave.at(station + experiment.speed * lidar.sweepDuration(), stamp).state.pose;
-    const geometry::Scan& scan = lidar.sweep(caster, truth.state.pose.compose(sensor), later.compose(sensor),
-                                             truck.lidar_z, 0.0, stamp);
+    const geometry::Scan& scan = lidar.sweep(caster, truth.state.pose.compose(sensor),
+                                             later.compose(sensor), truck.lidar_z, 0.0, stamp);
     const geometry::Pose moved = last.relative(truth.state.pose);
     const geometry::Pose odom = odometry.update(moved, i == 0 ? 0.0 : period);
     const perception::Tunnel* tunnel =
         chain.update(scan, sensor, odom, stamp + fromSeconds(setup.simulator.lidar.latency));
-    const perception::TunnelState state = tunnel != nullptr ? tunnel->state : perception::TunnelState{};
-    result.perception.push_back(comparePerception(state, truth, world.widthAt(truth.station)));
+    result.perception.push_back(comparePerception(
+        tunnel != nullptr ? tunnel->state : perception::TunnelState{}, truth, world.width));
     const double way = std::hypot(moved.x, moved.y);
-    if (way > 0.0) articulation += way * vehicle::articulationSlope(truck, moved.heading / way, articulation);
+    if (way > 0.0)
+      articulation += way * vehicle::articulationSlope(truck, moved.heading / way, articulation);
     result.track.push_back(trackSample(truth, truck, period * i, articulation, experiment.speed));
     last = truth.state.pose;
   }

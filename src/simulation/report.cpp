@@ -6,10 +6,9 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <set>
 #include <stdexcept>
-
-#include <nlohmann/json.hpp>
 
 #include "episode_plots.h"
 
@@ -31,7 +30,11 @@ std::string shown(const std::string& key, double value) {
   const double scaled = value * metricText(key).factor;
   const double magnitude = std::abs(scaled);
   const bool whole = std::abs(scaled - std::round(scaled)) < 1e-9 && magnitude < 1e6;
-  const int decimals = whole ? 0 : magnitude >= 1000 ? 0 : magnitude >= 100 ? 1 : magnitude >= 10 ? 2 : 3;
+  const int decimals = whole               ? 0
+                       : magnitude >= 1000 ? 0
+                       : magnitude >= 100  ? 1
+                       : magnitude >= 10   ? 2
+                                           : 3;
   std::snprintf(text, sizeof text, "%.*f", decimals, scaled);
   return text;
 }
@@ -141,9 +144,9 @@ ordered_json goalJson(const GoalResult& result) {
   ordered_json json;
   json["metric"] = result.goal.metric;
   json["paper"] = result.goal.paper;
-  json["judge"] = result.goal.judge == Judge::kMedian       ? "median"
+  json["judge"] = result.goal.judge == Judge::kMedian      ? "median"
                   : result.goal.judge == Judge::kEverySeed ? "every_seed"
-                                                            : "report_only";
+                                                           : "report_only";
   json["min"] = result.goal.min ? ordered_json(*result.goal.min) : ordered_json();
   json["max"] = result.goal.max ? ordered_json(*result.goal.max) : ordered_json();
   json["median"] = result.median;
@@ -220,12 +223,16 @@ Evaluation judge(const Scenario& scenario, const std::vector<EpisodeResult>& epi
 }
 
 std::string table(const Scenario& scenario, const Evaluation& evaluation) {
-  std::vector<std::vector<std::string>> rows = {{"metric", "paper", "goal", "median", "worst", "verdict"}};
+  std::vector<std::vector<std::string>> rows = {
+      {"metric", "paper", "goal", "median", "worst", "verdict"}};
   for (const GoalResult& result : evaluation.goals) {
     const MetricText& text = metricText(result.goal.metric);
     rows.push_back({text.words + (text.unit.empty() ? "" : " [" + text.unit + "]"), result.goal.paper,
-                    shownGoal(result.goal), shown(text.key, result.median), shown(text.key, result.worst),
-                    result.goal.judge == Judge::kReportOnly ? "-" : result.holds ? "ok" : "MISSED"});
+                    shownGoal(result.goal), shown(text.key, result.median),
+                    shown(text.key, result.worst),
+                    result.goal.judge == Judge::kReportOnly ? "-"
+                    : result.holds                          ? "ok"
+                                                            : "MISSED"});
   }
   std::vector<std::size_t> widths(rows.front().size(), 0);
   for (const auto& row : rows) {

@@ -27,9 +27,11 @@ PlantChoice loadPlant(config::Node node) {
 }
 
 // A file or folder named in a scenario stands relative to it.
-std::string besideScenario(config::Node& node, const std::string& key, const std::filesystem::path& base) {
+std::string besideScenario(config::Node& node, const std::string& key,
+                           const std::filesystem::path& base) {
   const std::filesystem::path path = (base / node.text(key)).lexically_normal();
-  if (!std::filesystem::exists(path)) node.refuse(key, "names '" + path.string() + "', which does not exist");
+  if (!std::filesystem::exists(path))
+    node.refuse(key, "names '" + path.string() + "', which does not exist");
   return path.string();
 }
 
@@ -97,8 +99,9 @@ Goal loadGoal(config::Node node) {
   if (!isMetric(goal.metric)) node.refuse("metric", "= '" + goal.metric + "' is no metric");
   goal.paper = node.text("paper");
   const std::string judge = node.choice("judge", {"every_seed", "median", "report_only"});
-  goal.judge = judge == "median" ? Judge::kMedian
-                                 : judge == "every_seed" ? Judge::kEverySeed : Judge::kReportOnly;
+  goal.judge = judge == "median"       ? Judge::kMedian
+               : judge == "every_seed" ? Judge::kEverySeed
+                                       : Judge::kReportOnly;
   if (node.has("min")) goal.min = node.number("min", "SI", -1e6, 1e6);
   if (node.has("max")) goal.max = node.number("max", "SI", goal.min.value_or(-1e6), 1e6);
   const bool bounded = goal.min || goal.max;

@@ -1,13 +1,12 @@
 #include "experiments.h"
-
 #include "tunnel_pilot/vehicle/articulation.h"
 
 namespace tunnel_pilot::simulation {
 namespace {
 
-constexpr double kSpeedGain = 2.0;      // [1/s]
-constexpr double kIntegralGain = 0.5;   // holds against rolling resistance [1/s^2]
-constexpr double kRecordRate = 50.0;    // [Hz]
+constexpr double kSpeedGain = 2.0;     // [1/s]
+constexpr double kIntegralGain = 0.5;  // holds against rolling resistance [1/s^2]
+constexpr double kRecordRate = 50.0;   // [Hz]
 
 }  // namespace
 

@@ -1,14 +1,16 @@
 // evaluate: runs a scenario without ROS, holds it against its goals, writes a report.
+#include <unistd.h>
+
 #include <algorithm>
+#include <boost/program_options.hpp>
 #include <chrono>
 #include <cstdio>
 #include <exception>
 #include <iostream>
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
-
-#include <boost/program_options.hpp>
-#include <unistd.h>
 
 #include "tunnel_pilot/simulation/episode.h"
 
@@ -31,15 +33,17 @@ struct Arguments {
 
 // False when only help was asked for. Throws options::error.
 bool parse(int argc, char** argv, Arguments& arguments) {
-  options::options_description shown("evaluate SCENARIO.yaml...: runs scenarios and judges them.\nOptions");
+  options::options_description shown(
+      "evaluate SCENARIO.yaml...: runs scenarios and judges them.\nOptions");
   shown.add_options()("help,h", "this text")(
       "scenario", options::value(&arguments.scenarios)->required()->value_name("FILE"),
-      "scenario file; also without the option's name")(
-      "seeds", options::value(&arguments.seeds)->value_name("N"), "number of seeds instead of the scenario's")(
+      "scenario file; also without the option's name")("seeds",
+                                                       options::value(&arguments.seeds)->value_name("N"),
+                                                       "number of seeds instead of the scenario's")(
       "out", options::value(&arguments.out)->value_name("DIR"),
-      "writes summary.json, CSV files and plots to DIR/<scenario>; without it only the table is printed")(
-      "config", options::value(&arguments.config)->value_name("DIR"),
-      "parameter files instead of the scenario's")(
+      "writes summary.json, CSV files and plots to DIR/<scenario>; without it only the table is "
+      "printed")("config", options::value(&arguments.config)->value_name("DIR"),
+                 "parameter files instead of the scenario's")(
       "jobs", options::value(&arguments.jobs)->default_value(1)->value_name("N"), "threads");
   options::positional_options_description positional;
   positional.add("scenario", -1);
@@ -67,8 +71,8 @@ class ProgressLine {
     if (!terminal_ && !last) return;
     const double elapsed =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-    std::fprintf(stderr, "%s%s: %zu of %zu episodes, %.1f s%s", terminal_ ? "\r" : "", name_.c_str(), done,
-                 total_, elapsed, last ? "\n" : "");
+    std::fprintf(stderr, "%s%s: %zu of %zu episodes, %.1f s%s", terminal_ ? "\r" : "", name_.c_str(),
+                 done, total_, elapsed, last ? "\n" : "");
     std::fflush(stderr);
   }
 
@@ -87,6 +91,17 @@ double simulatedTime(const std::vector<simulation::EpisodeResult>& episodes) {
   return sum;
 }
 
+// How the episodes ended: "way driven (19), contact (1)".
+std::string endings(const std::vector<simulation::EpisodeResult>& episodes) {
+  std::map<std::string, int> counts;
+  for (const simulation::EpisodeResult& episode : episodes) ++counts[episode.ending];
+  std::string text;
+  for (const auto& [ending, count] : counts) {
+    text += (text.empty() ? "" : ", ") + ending + " (" + std::to_string(count) + ")";
+  }
+  return text;
+}
+
 // True when every goal of the scenario holds.
 bool evaluate(const std::string& file, const Arguments& arguments) {
   simulation::Scenario scenario = simulation::loadScenario(file);
@@ -103,8 +118,8 @@ bool evaluate(const std::string& file, const Arguments& arguments) {
 
   const simulation::Evaluation evaluation = simulation::judge(scenario, episodes);
   std::cout << simulation::table(scenario, evaluation);
-  std::printf("%zu episodes, %.0f times real time. %s\n\n", episodes.size(),
-              simulatedTime(episodes) / std::max(elapsed, 1e-9),
+  std::printf("%zu episodes, %.0f times real time: %s. %s\n\n", episodes.size(),
+              simulatedTime(episodes) / std::max(elapsed, 1e-9), endings(episodes).c_str(),
               evaluation.passed ? "Every goal holds." : "A goal is MISSED.");
   std::fflush(stdout);
   if (!arguments.out.empty()) {

@@ -1,6 +1,13 @@
 // perceive: runs the perception core over a recorded bag; one CSV row a scan.
+#include <nav_msgs/Odometry.h>
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+#include <sensor_msgs/LaserScan.h>
+#include <sys/resource.h>
+
 #include <algorithm>
 #include <array>
+#include <boost/program_options.hpp>
 #include <cmath>
 #include <cstdio>
 #include <exception>
@@ -11,13 +18,6 @@
 #include <stdexcept>
 #include <string>
 #include <vector>
-
-#include <boost/program_options.hpp>
-#include <nav_msgs/Odometry.h>
-#include <rosbag/bag.h>
-#include <rosbag/view.h>
-#include <sensor_msgs/LaserScan.h>
-#include <sys/resource.h>
 
 #include "tunnel_pilot/drivers/motion_history.h"
 #include "tunnel_pilot/simulation/perception_chain.h"
@@ -50,7 +50,8 @@ bool parse(int argc, char** argv, Arguments& arguments) {
       "topic", options::value(&arguments.topic)->value_name("NAME"),
       "scan topic; needed only where the bag has several and none is /scan")(
       "config", options::value(&arguments.config)->value_name("DIR"),
-      "scan_filter.yaml, wall_segmentation.yaml or centerline.yaml found here replace the package's own, "
+      "scan_filter.yaml, wall_segmentation.yaml or centerline.yaml found here replace the package's "
+      "own, "
       "for instance config/corridor for widths of 1.5 to 4 m")(
       "transform", options::value(&arguments.transform)->multitoken()->value_name("X Y YAW"),
       "laser in base_link [m m rad]; without it the laser's frame is taken as base_link");
@@ -76,7 +77,8 @@ std::string defaultConfig() {
   const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe");
   for (std::filesystem::path folder = program.parent_path(); folder.has_relative_path();
        folder = folder.parent_path()) {
-    for (const std::filesystem::path& config : {folder / "config", folder / "share/tunnel_pilot/config"}) {
+    for (const std::filesystem::path& config :
+         {folder / "config", folder / "share/tunnel_pilot/config"}) {
       if (std::filesystem::exists(config / "centerline.yaml")) return config.string();
     }
   }
@@ -242,7 +244,8 @@ int main(int argc, char** argv) {
     perceive(arguments);
     return 0;
   } catch (const std::exception& error) {
-    std::cerr << "perceive: " << (arguments.bag.empty() ? "" : arguments.bag + ": ") << error.what() << "\n";
+    std::cerr << "perceive: " << (arguments.bag.empty() ? "" : arguments.bag + ": ") << error.what()
+              << "\n";
     return 2;
   }
 }

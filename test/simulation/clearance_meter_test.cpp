@@ -1,8 +1,8 @@
 #include "tunnel_pilot/simulation/clearance_meter.h"
 
-#include <cmath>
-
 #include <gtest/gtest.h>
+
+#include <cmath>
 
 #include "tunnel_pilot/simulation/random.h"
 #include "tunnel_pilot/world/ray_caster.h"
@@ -39,8 +39,8 @@ TEST(ClearanceMeter, AgreesWithTheWorldsExhaustiveSearch) {
   }
   const ClearanceMeter meter(walls);
   for (int i = 0; i < 500; ++i) {
-    const auto outline =
-        box({random.uniform(0.0, 200.0), random.uniform(-2.5, 2.5), random.uniform(-3.0, 3.0)}, 6.0, 3.0);
+    const auto outline = box(
+        {random.uniform(0.0, 200.0), random.uniform(-2.5, 2.5), random.uniform(-3.0, 3.0)}, 6.0, 3.0);
     EXPECT_NEAR(meter.clearance(outline), world::clearance(outline, walls), 1e-9);
   }
 }

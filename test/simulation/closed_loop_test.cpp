@@ -1,8 +1,8 @@
 // The pilot, the bus and the simulated truck together.
+#include <gtest/gtest.h>
+
 #include <cmath>
 #include <filesystem>
-
-#include <gtest/gtest.h>
 
 #include "tunnel_pilot/can/memory_bus.h"
 #include "tunnel_pilot/simulation/episode.h"
@@ -37,10 +37,11 @@ class Drift : public ::testing::Test {
         truck_side_(hub_.connect()),
         pilot_side_(hub_.connect()),
         simulator_(loadSimulator(config::loadFile(kPackage + "/config/simulator.yaml")),
-                   loadTruckController(config::loadFile(kPackage + "/config/truck_controller.yaml")), truck_,
+                   loadTruckController(config::loadFile(kPackage + "/config/truck_controller.yaml")),
+                   truck_,
                    std::make_unique<vehicle::DynamicTruck>(truck_, vehicle::DynamicTruckOptions{}),
-                   vehicle::Load::kLoaded, world::loadWorld(kPackage + "/worlds/default_drift.yaml"), kSeed,
-                   *truck_side_),
+                   vehicle::Load::kLoaded, world::loadWorld(kPackage + "/worlds/default_drift.yaml"),
+                   kSeed, *truck_side_),
         pilot_(loadPilot(kPackage + "/config"), truck_, *pilot_side_) {}
 
   void run(double seconds) {
@@ -147,8 +148,10 @@ TEST(Episode, DrivesItsWayAndTellsItsFigures) {
 TEST(Episode, DependsOnItsSeedAlone) {
   const Scenario scenario = straightDrive();
   const simulation::Setup setup = loadSetup(scenario);
-  const auto results = runEpisodes(scenario, setup, {{kSeed, false}, {kSeed + 1, false}}, 1, [](auto) {});
-  const auto threaded = runEpisodes(scenario, setup, {{kSeed, false}, {kSeed + 1, false}}, 2, [](auto) {});
+  const auto results =
+      runEpisodes(scenario, setup, {{kSeed, false}, {kSeed + 1, false}}, 1, [](auto) {});
+  const auto threaded =
+      runEpisodes(scenario, setup, {{kSeed, false}, {kSeed + 1, false}}, 2, [](auto) {});
   for (std::size_t i = 0; i < results.size(); ++i) {
     EXPECT_EQ(results[i].metrics, threaded[i].metrics);
     ASSERT_EQ(results[i].track.size(), threaded[i].track.size());
@@ -182,7 +185,8 @@ TEST(Episode, AWorldThatIsNotThereIsTold) {
   Scenario scenario = straightDrive();
   const simulation::Setup setup = loadSetup(scenario);
   std::get<DriveExperiment>(scenario.experiment).world_file = "nowhere.yaml";
-  EXPECT_THROW(runEpisodes(scenario, setup, {{1, false}, {2, false}}, 2, [](auto) {}), config::ConfigError);
+  EXPECT_THROW(runEpisodes(scenario, setup, {{1, false}, {2, false}}, 2, [](auto) {}),
+               config::ConfigError);
 }
 
 TEST(EpisodePlans, HoldEverySeedInEveryDirection) {

@@ -1,10 +1,10 @@
 #include "tunnel_pilot/simulation/lidar_model.h"
 
+#include <gtest/gtest.h>
+
 #include <array>
 #include <cmath>
 #include <vector>
-
-#include <gtest/gtest.h>
 
 namespace tunnel_pilot::simulation {
 namespace {
@@ -47,8 +47,8 @@ struct Bench {
   }
 };
 
-// The line of the plant acceptance: the histogram of range errors is a normal distribution with the stated
-// sigma round the unit's stated bias.
+// The line of the plant acceptance: the histogram of range errors is a normal distribution with the
+// stated sigma round the unit's stated bias.
 TEST(LidarModel, RangeHistogramMatchesStatedSigmaAndBias) {
   const LidarParameters parameters = withoutDust();
   ASSERT_DOUBLE_EQ(parameters.range_sigma, 0.012);
@@ -74,8 +74,10 @@ TEST(LidarModel, RangeHistogramMatchesStatedSigmaAndBias) {
   EXPECT_NEAR(std::sqrt(squares / count - mean * mean), 0.012, 0.0001);
   for (std::size_t bin = 0; bin < histogram.size(); ++bin) {
     const double low = -3.0 + 0.5 * static_cast<double>(bin);
-    const double share = 0.5 * (std::erfc(-(low + 0.5) / std::sqrt(2.0)) - std::erfc(-low / std::sqrt(2.0)));
-    EXPECT_NEAR(histogram[bin], share * count, 5 * std::sqrt(share * count)) << "bin at " << low << " sigma";
+    const double share =
+        0.5 * (std::erfc(-(low + 0.5) / std::sqrt(2.0)) - std::erfc(-low / std::sqrt(2.0)));
+    EXPECT_NEAR(histogram[bin], share * count, 5 * std::sqrt(share * count))
+        << "bin at " << low << " sigma";
   }
 }
 

@@ -1,9 +1,9 @@
-#include <cmath>
-#include <limits>
+#include "tunnel_pilot/simulation/metrics.h"
 
 #include <gtest/gtest.h>
 
-#include "tunnel_pilot/simulation/metrics.h"
+#include <cmath>
+#include <limits>
 
 namespace tunnel_pilot::simulation {
 namespace {

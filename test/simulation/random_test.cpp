@@ -1,11 +1,11 @@
+#include "tunnel_pilot/simulation/random.h"
+
+#include <gtest/gtest.h>
+
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <vector>
-
-#include <gtest/gtest.h>
-
-#include "tunnel_pilot/simulation/random.h"
 
 namespace tunnel_pilot::simulation {
 namespace {

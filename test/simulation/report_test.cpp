@@ -1,16 +1,15 @@
 #include "tunnel_pilot/simulation/report.h"
 
+#include <gtest/gtest.h>
+#include <unistd.h>
+
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <map>
-#include <sstream>
-
-#include <unistd.h>
-
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <sstream>
 
 #include "tunnel_pilot/simulation/chart.h"
 
@@ -102,8 +101,8 @@ TEST(Judge, AMedianGoalForgivesTheWorst) {
 
 TEST(Judge, WorstOfATwoSidedGoalIsTheFarthestOut) {
   const Goal goal{"lateral_mean", "-", Judge::kEverySeed, -0.02, 0.02};
-  EXPECT_DOUBLE_EQ(judge(probe({goal}), episodesWith("lateral_mean", {0.015, -0.019, 0.0})).goals[0].worst,
-                   -0.019);
+  EXPECT_DOUBLE_EQ(
+      judge(probe({goal}), episodesWith("lateral_mean", {0.015, -0.019, 0.0})).goals[0].worst, -0.019);
 }
 
 TEST(Judge, AMissingMetricAndNoEpisodesFail) {
@@ -114,7 +113,8 @@ TEST(Judge, AMissingMetricAndNoEpisodesFail) {
 
 TEST(Judge, ReportOnlyNeverFails) {
   EXPECT_TRUE(judge(probe({{"lateral_rms", "-", Judge::kReportOnly, {}, {}}}),
-                    episodesWith("lateral_rms", {1e9})).passed);
+                    episodesWith("lateral_rms", {1e9}))
+                  .passed);
 }
 
 TEST(Table, ShowsPaperGoalMedianWorstAndVerdictInTheMetricsUnit) {
@@ -145,7 +145,8 @@ TEST_F(ReportFolder, SameResultsGiveTheSameBytes) {
 TEST_F(ReportFolder, SummaryHoldsGoalsEpisodesAndFingerprints) {
   const Scenario scenario = probe({{"lateral_rms", "-", Judge::kEverySeed, {}, 0.1}});
   const auto episodes = episodesWith("lateral_rms", {0.01, INFINITY});
-  writeReport(sub("a"), scenario, judge(scenario, episodes), episodes, {"aa", "bb", "cc", "dd"}, truck());
+  writeReport(sub("a"), scenario, judge(scenario, episodes), episodes, {"aa", "bb", "cc", "dd"},
+              truck());
   const auto json = nlohmann::json::parse(contentOf(folder_ / "a" / "summary.json"));
   EXPECT_FALSE(json.at("passed").get<bool>());
   EXPECT_EQ(json.at("sha256").at("plant"), "cc");
@@ -157,8 +158,9 @@ TEST_F(ReportFolder, SummaryHoldsGoalsEpisodesAndFingerprints) {
 TEST_F(ReportFolder, ThatCannotBeMadeIsTold) {
   const Scenario scenario = probe({{"lateral_rms", "-", Judge::kEverySeed, {}, 0.1}});
   const auto episodes = episodesWith("lateral_rms", {0.01});
-  EXPECT_THROW(writeReport("/dev/null/report", scenario, judge(scenario, episodes), episodes, {}, truck()),
-               std::runtime_error);
+  EXPECT_THROW(
+      writeReport("/dev/null/report", scenario, judge(scenario, episodes), episodes, {}, truck()),
+      std::runtime_error);
 }
 
 TEST(Chart, DrawsItsLineWhereItsValuesAre) {

@@ -1,12 +1,11 @@
 #include "tunnel_pilot/simulation/scenario.h"
 
+#include <gtest/gtest.h>
+#include <unistd.h>
+
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-
-#include <unistd.h>
-
-#include <gtest/gtest.h>
 
 namespace tunnel_pilot::simulation {
 namespace {
@@ -35,8 +34,7 @@ goals:
 class ScenarioFile : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_ = std::filesystem::temp_directory_path() /
-              ("scenario_test_" + std::to_string(::getpid()));
+    folder_ = std::filesystem::temp_directory_path() / ("scenario_test_" + std::to_string(::getpid()));
     std::filesystem::create_directories(folder_ / "config");
     std::ofstream(folder_ / "world.yaml") << "type: tunnel\n";
   }

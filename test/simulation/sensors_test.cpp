@@ -1,8 +1,8 @@
-#include <cmath>
+#include "tunnel_pilot/simulation/sensors.h"
 
 #include <gtest/gtest.h>
 
-#include "tunnel_pilot/simulation/sensors.h"
+#include <cmath>
 
 namespace tunnel_pilot::simulation {
 namespace {

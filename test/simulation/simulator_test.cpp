@@ -1,8 +1,8 @@
 #include "tunnel_pilot/simulation/simulator.h"
 
-#include <cmath>
-
 #include <gtest/gtest.h>
+
+#include <cmath>
 
 #include "tunnel_pilot/can/memory_bus.h"
 #include "tunnel_pilot/vehicle/articulation.h"
@@ -32,9 +32,9 @@ struct Bench {
   Simulator simulator;
 
   explicit Bench(world::World world = drift(), std::uint64_t seed = 1000)
-      : simulator(parameters, loadTruckController(config::loadFile(kConfig + "truck_controller.yaml")), truck,
-                  std::make_unique<vehicle::KinematicTruck>(truck), vehicle::Load::kLoaded, std::move(world),
-                  seed, *truck_side) {}
+      : simulator(parameters, loadTruckController(config::loadFile(kConfig + "truck_controller.yaml")),
+                  truck, std::make_unique<vehicle::KinematicTruck>(truck), vehicle::Load::kLoaded,
+                  std::move(world), seed, *truck_side) {}
 
   // Rolls straight on at `speed` for `seconds`; returns the scans that came.
   std::vector<geometry::Scan> roll(double speed, double seconds) {
@@ -87,7 +87,8 @@ TEST(Simulator, AScanShowsTheWorldFromWhereTheTruckWasAtItsStamp) {
   const auto scans = bench.roll(3.0, 2.0);
   const geometry::Scan& scan = scans.back();
   const double lidar_x = 3.0 * toSeconds(scan.stamp) + bench.truck.geometry.lidar_x;
-  // A beam 60 degrees to the left meets the wall 3 m aside, whatever the way; the far end is not in range.
+  // A beam 60 degrees to the left meets the wall 3 m aside, whatever the way; the far end is not in
+  // range.
   EXPECT_NEAR(scan.ranges[380 + 240], 3.0 / std::sin(M_PI / 3), 0.08);
   EXPECT_NEAR(bench.simulator.truthOfScan().state.pose.x + bench.truck.geometry.lidar_x, lidar_x, 1e-6);
   EXPECT_EQ(bench.simulator.truthOfScan().stamp, scan.stamp);
@@ -206,7 +207,8 @@ TEST(SimulatorParameters, EveryMissingKeyIsRefused) {
     try {
       loadSimulator(config::Node(bad, "simulator.yaml"));
     } catch (const config::ConfigError& error) {
-      refused += std::string(error.what()).find(entry.first.as<std::string>()) != std::string::npos ? 1 : 0;
+      refused +=
+          std::string(error.what()).find(entry.first.as<std::string>()) != std::string::npos ? 1 : 0;
     }
   }
   EXPECT_EQ(refused, keys);

@@ -1,3 +1,9 @@
+#include <gtest/gtest.h>
+#include <nav_msgs/Odometry.h>
+#include <rosbag/bag.h>
+#include <sensor_msgs/LaserScan.h>
+#include <std_msgs/Header.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -7,12 +13,6 @@
 #include <iostream>
 #include <map>
 #include <sstream>
-
-#include <gtest/gtest.h>
-#include <nav_msgs/Odometry.h>
-#include <rosbag/bag.h>
-#include <sensor_msgs/LaserScan.h>
-#include <std_msgs/Header.h>
 
 #include "program.h"
 #include "tunnel_pilot/simulation/metrics.h"
@@ -56,7 +56,8 @@ std::vector<Row> rowsOf(const std::string& file) {
 
 ros::Time timeOf(int i) { return ros::Time(100.0 + 0.1 * i); }
 
-// What a lidar sees that stands 0.4 m left of the middle of a straight drift 5 m wide, turned by 0.05 rad.
+// What a lidar sees that stands 0.4 m left of the middle of a straight drift 5 m wide, turned by 0.05
+// rad.
 sensor_msgs::LaserScan scanOf(const geometry::Scan& scan, int i) {
   sensor_msgs::LaserScan message;
   message.header.stamp = timeOf(i);
@@ -80,7 +81,8 @@ class Perceive : public ::testing::Test {
   static void writeBag(const std::string& file, const std::vector<std::string>& topics, int scans) {
     const auto parameters =
         simulation::loadSimulator(config::loadFile(kPackage + "/config/simulator.yaml")).lidar;
-    const std::vector<world::WallChain> walls = {{{-50.0, 2.5}, {80.0, 2.5}}, {{-50.0, -2.5}, {80.0, -2.5}}};
+    const std::vector<world::WallChain> walls = {{{-50.0, 2.5}, {80.0, 2.5}},
+                                                 {{-50.0, -2.5}, {80.0, -2.5}}};
     const world::RayCaster caster(walls, simulation::LidarModel::beams(parameters));
     simulation::LidarModel lidar(parameters, 1000);
     rosbag::Bag out(file, rosbag::bagmode::Write);
@@ -89,7 +91,8 @@ class Perceive : public ::testing::Test {
       odometry.header.stamp = timeOf(i);
       odometry.pose.pose.orientation.w = 1.0;
       out.write("/odom", timeOf(i), odometry);
-      const geometry::Scan& scan = lidar.sweep(caster, {0.0, 0.4, 0.05}, {0.0, 0.4, 0.05}, 1.5, 0.0, Stamp(i));
+      const geometry::Scan& scan =
+          lidar.sweep(caster, {0.0, 0.4, 0.05}, {0.0, 0.4, 0.05}, 1.5, 0.0, Stamp(i));
       for (const std::string& topic : topics) out.write(topic, timeOf(i), scanOf(scan, i));
     }
     std_msgs::Header other;
@@ -122,7 +125,8 @@ TEST_F(Perceive, ATransformMovesTheAnswerToTheBase) {
 }
 
 TEST_F(Perceive, OtherWidthsAreNoTunnel) {
-  ASSERT_EQ(perceive({"--bag", bag(), "--csv", csv(), "--config", kPackage + "/config/corridor"}).status, 0);
+  ASSERT_EQ(perceive({"--bag", bag(), "--csv", csv(), "--config", kPackage + "/config/corridor"}).status,
+            0);
   for (const Row& row : rowsOf(csv())) EXPECT_FALSE(row.valid);
 }
 
@@ -187,7 +191,8 @@ TEST_F(Perceive, ABagWithWrongBytesNeverCrashes) {
     // Half of the faults fall on the headers at the front and the index at the end.
     const std::size_t range = i % 4 == 0 ? 8192 : i % 4 == 1 ? 4096 : content.size();
     for (int k = 0; k < 8; ++k) {
-      const auto at = static_cast<std::size_t>(random.uniform() * static_cast<double>(std::min(range, bad.size())));
+      const auto at =
+          static_cast<std::size_t>(random.uniform() * static_cast<double>(std::min(range, bad.size())));
       bad[i % 4 == 1 ? bad.size() - 1 - at : at] = static_cast<char>(random.bits());
     }
     std::ofstream(place_.file("bad.bag"), std::ios::binary) << bad;
@@ -200,7 +205,8 @@ TEST_F(Perceive, ABagWithWrongBytesNeverCrashes) {
 // Recordings are other people's: they lie beside the repository or where TUNNEL_PILOT_DATA says.
 std::string recording(const std::string& name) {
   const char* folder = std::getenv("TUNNEL_PILOT_DATA");
-  const std::string file = (folder != nullptr ? std::string(folder) : kPackage + "/../shared/data") + "/" + name;
+  const std::string file =
+      (folder != nullptr ? std::string(folder) : kPackage + "/../shared/data") + "/" + name;
   return std::filesystem::exists(file) ? file : "";
 }
 
@@ -230,7 +236,8 @@ std::vector<std::map<std::string, double>> tableOf(const std::string& file) {
 TEST_F(Perceive, AgreesWithIndependentFitsOfARealCorridor) {
   const std::string duke = recording("duke_loop5.bag");
   SKIP_WITHOUT(duke);
-  ASSERT_EQ(perceive({"--bag", duke, "--csv", csv(), "--config", kPackage + "/config/corridor"}).status, 0);
+  ASSERT_EQ(perceive({"--bag", duke, "--csv", csv(), "--config", kPackage + "/config/corridor"}).status,
+            0);
   const std::vector<Row> rows = rowsOf(csv());
   EXPECT_EQ(rows.size(), 551u);
   int usable = 0;
@@ -270,7 +277,8 @@ TEST_F(Perceive, SeesNoTunnelAmongWalkingPeople) {
 }
 
 TEST_F(Perceive, ReadsAHallAndASickWithItsOddities) {
-  for (const auto& [name, scans] : {std::pair{"malaga_telecom.bag", 225u}, std::pair{"sick_tim.bag", 762u}}) {
+  for (const auto& [name, scans] :
+       {std::pair{"malaga_telecom.bag", 225u}, std::pair{"sick_tim.bag", 762u}}) {
     const std::string file = recording(name);
     SKIP_WITHOUT(file);
     ASSERT_EQ(perceive({"--bag", file, "--csv", csv()}).status, 0) << name;

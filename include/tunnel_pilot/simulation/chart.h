@@ -1,9 +1,8 @@
 #pragma once
 
+#include <opencv2/core.hpp>
 #include <string>
 #include <vector>
-
-#include <opencv2/core.hpp>
 
 #include "tunnel_pilot/geometry/pose.h"
 
@@ -33,7 +32,8 @@ class Chart {
   void line(std::vector<geometry::Point> points, const cv::Scalar& colour, const std::string& name = "",
             double thickness = 2.0);
   /// Adds a filled polygon, drawn beneath all lines.
-  void area(std::vector<geometry::Point> outline, const cv::Scalar& colour, const std::string& name = "");
+  void area(std::vector<geometry::Point> outline, const cv::Scalar& colour,
+            const std::string& name = "");
   /// One unit along x is as long as one along y (a map).
   void equalAxes() { equal_axes_ = true; }
   /// Makes sure that the y axis shows at least [low, high].

@@ -24,9 +24,10 @@ struct Setup {
 /// Throws config::ConfigError.
 Setup loadSetup(const Scenario& scenario);
 
-/// The plant that a seed drives: with its own parameters where the scenario varies them, and its own road.
-std::unique_ptr<vehicle::Plant> makePlant(const PlantChoice& choice, const vehicle::TruckParameters& truck,
-                                          std::uint64_t seed);
+/// The plant that a seed drives: with its own parameters where the scenario varies them, and its own
+/// road.
+std::unique_ptr<vehicle::Plant> makePlant(const PlantChoice& choice,
+                                          const vehicle::TruckParameters& truck, std::uint64_t seed);
 
 /// One seed of a scenario, once along its way.
 struct EpisodePlan {
@@ -37,8 +38,8 @@ struct EpisodePlan {
 /// All episodes of a scenario: `seeds` seeds from its first one, each in the directions it asks for.
 std::vector<EpisodePlan> episodePlans(const Scenario& scenario, int seeds);
 
-/// Runs one episode. Depends on its arguments alone. Throws config::ConfigError when the scenario's world
-/// cannot be read.
+/// Runs one episode. Depends on its arguments alone. Throws config::ConfigError when the scenario's
+/// world cannot be read.
 EpisodeResult runEpisode(const Scenario& scenario, const Setup& setup, const EpisodePlan& plan);
 
 /// Runs episodes on `jobs` threads and returns them in the order of their plans; `progress` is called

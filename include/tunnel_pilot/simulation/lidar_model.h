@@ -30,20 +30,20 @@ struct LidarParameters {
   double angle_min;        ///< first beam, left of forward positive [rad]
   double angle_increment;  ///< [rad]
   int beams;
-  double range_min;        ///< [m]
-  double range_max;        ///< [m]
-  double range_sigma;      ///< noise of one range [m]
-  double range_bias_max;   ///< a unit's bias is drawn from +- this [m]
-  int sectors;             ///< parts of a sweep that are cast from a pose of their own
+  double range_min;       ///< [m]
+  double range_max;       ///< [m]
+  double range_sigma;     ///< noise of one range [m]
+  double range_bias_max;  ///< a unit's bias is drawn from +- this [m]
+  int sectors;            ///< parts of a sweep that are cast from a pose of their own
   DustParameters dust;
 };
 
 LidarParameters loadLidar(config::Node node);
 
 /// A rotating planar lidar: exact ranges (world::RayCaster) from a pose that moves during the sweep,
-/// plus bias, noise, dust and the shadow the ground throws when the truck pitches. The time between beams
-/// is that of a full turn, angle_increment / (2 pi rate). REP-117: beyond range_max +infinity, below
-/// range_min -infinity.
+/// plus bias, noise, dust and the shadow the ground throws when the truck pitches. The time between
+/// beams is that of a full turn, angle_increment / (2 pi rate). REP-117: beyond range_max +infinity,
+/// below range_min -infinity.
 class LidarModel {
  public:
   LidarModel(const LidarParameters& parameters, std::uint64_t seed);

@@ -56,9 +56,9 @@ struct MetricText {
 const MetricText& metricText(const std::string& key);
 bool isMetric(const std::string& key);
 
-/// Figures of a drive along `line` (a tunnel's design line): lateral_mean, _rms, _max; heading_mean, _rms
-/// over all, and heading_rms_straights where the line is straight; articulation_std_straights where it
-/// has been straight for 10 m and stays so for 3 m (before that the hinge is still unwinding, by
+/// Figures of a drive along `line` (a tunnel's design line): lateral_mean, _rms, _max; heading_mean,
+/// _rms over all, and heading_rms_straights where the line is straight; articulation_std_straights where
+/// it has been straight for 10 m and stays so for 3 m (before that the hinge is still unwinding, by
 /// geometry); clearance_min, speed_mean, distance. Samples at standstill do not count.
 Metrics driveMetrics(const std::vector<TrackSample>& track, const geometry::Path& line);
 
@@ -75,8 +75,8 @@ Metrics pathMetrics(const std::vector<TrackSample>& track);
 /// lateral_acceleration. Throws std::invalid_argument when nothing was recorded after that time.
 Metrics steadyTurnMetrics(const std::vector<TrackSample>& track, double settled, double angle);
 
-/// Figures of the perception: valid_share, and of the valid answers the absolute errors' medians and 95th
-/// percentiles by radius of bend: tight (8-16 m), gentle (wider than 16 m), straight.
+/// Figures of the perception: valid_share, and of the valid answers the absolute errors' medians and
+/// 95th percentiles by radius of bend: tight (8-16 m), gentle (wider than 16 m), straight.
 Metrics perceptionMetrics(const std::vector<PerceptionSample>& samples);
 
 /// Quantile `share` in [0, 1] by linear interpolation between order statistics; NaN of nothing.

@@ -81,7 +81,9 @@ class Random {
 
   static const NormalTable& normalTable();
 
-  static std::uint64_t rotate(std::uint64_t value, int by) { return (value << by) | (value >> (64 - by)); }
+  static std::uint64_t rotate(std::uint64_t value, int by) {
+    return (value << by) | (value >> (64 - by));
+  }
 
   static double interpolate(const std::array<double, kCells + 1>& knots, std::size_t cell,
                             double fraction) {

@@ -18,8 +18,8 @@ struct EpisodeResult {
   Metrics metrics;
   std::vector<TrackSample> track;
   std::vector<PerceptionSample> perception;
-  geometry::Path line;                 ///< reference of the offsets
-  std::vector<world::WallChain> walls; ///< for the plot
+  geometry::Path line;                  ///< reference of the offsets
+  std::vector<world::WallChain> walls;  ///< for the plot
 
   std::string label() const;  ///< "seed 3", "seed 3 reversed"
 };
@@ -27,7 +27,7 @@ struct EpisodeResult {
 struct GoalResult {
   Goal goal;
   double median = 0.0;
-  double worst = 0.0;         ///< of the episodes, by the goal's bounds
+  double worst = 0.0;  ///< of the episodes, by the goal's bounds
   std::string worst_episode;
   bool holds = false;
 };

@@ -24,16 +24,16 @@ struct PlantChoice {
 /// The whole pilot drives through a world, in closed loop over CAN frames.
 struct DriveExperiment {
   std::string world_file;
-  bool both_directions;    ///< every seed once along the design line and once against it
-  double station;          ///< start [m]
-  double lateral_offset;   ///< start, left of the design line [m]
-  double heading_error;    ///< start [rad]
-  double rolling_speed;    ///< > 0: an operator drives straight up to the start pose at this speed, and
-                           ///< hands over there; 0: start from standstill [m/s]
-  double top_speed;        ///< no faster than this [m/s]
-  double distance;         ///< ends after this; 0: one lap, or the line's end less the sight needed [m]
-  double time_limit;       ///< [s]
-  bool return_metrics;     ///< also judge it as a return to the centre
+  bool both_directions;   ///< every seed once along the design line and once against it
+  double station;         ///< start [m]
+  double lateral_offset;  ///< start, left of the design line [m]
+  double heading_error;   ///< start [rad]
+  double rolling_speed;   ///< > 0: an operator drives straight up to the start pose at this speed, and
+                          ///< hands over there; 0: start from standstill [m/s]
+  double top_speed;       ///< no faster than this [m/s]
+  double distance;        ///< ends after this; 0: one lap, or the line's end less the sight needed [m]
+  double time_limit;      ///< [s]
+  bool return_metrics;    ///< also judge it as a return to the centre
 };
 
 /// The plant alone, with a constant articulation demand and a speed held.
@@ -47,12 +47,13 @@ struct SteadyTurnExperiment {
 
 /// The driver follows a designed path that it senses with noise; no walls, speed held.
 struct LaneChangeExperiment {
-  double speed;           ///< [m/s]
-  double offset;          ///< b: the lanes lie this far apart [m]
-  double change_length;   ///< one half-cosine takes this long, along the lane [m]
-  std::vector<double> straights;  ///< before, between and after the changes [m]; 2 for a single change, 3 for a double
-  double offset_sigma;    ///< noise of the sensed path, per scan [m]
-  double heading_sigma;   ///< [rad]
+  double speed;          ///< [m/s]
+  double offset;         ///< b: the lanes lie this far apart [m]
+  double change_length;  ///< one half-cosine takes this long, along the lane [m]
+  std::vector<double>
+      straights;  ///< before, between and after the changes [m]; 2 for a single change, 3 for a double
+  double offset_sigma;   ///< noise of the sensed path, per scan [m]
+  double heading_sigma;  ///< [rad]
 };
 
 /// The perception alone, against the truth, while a truck is led along the design line with a gentle
@@ -60,10 +61,10 @@ struct LaneChangeExperiment {
 struct PerceptionExperiment {
   std::string world_file;
   bool both_directions;
-  double speed;          ///< [m/s]
-  double weave_offset;   ///< amplitude of the weave [m]
-  double weave_length;   ///< its wave length [m]
-  double distance;       ///< 0: one lap, or to the line's end less the sight needed [m]
+  double speed;         ///< [m/s]
+  double weave_offset;  ///< amplitude of the weave [m]
+  double weave_length;  ///< its wave length [m]
+  double distance;      ///< 0: one lap, or to the line's end less the sight needed [m]
 };
 
 using Experiment =
@@ -73,8 +74,8 @@ enum class Judge { kEverySeed, kMedian, kReportOnly };
 
 /// What a metric must be. Values in SI units.
 struct Goal {
-  std::string metric;          ///< see metrics.h
-  std::string paper;           ///< what the paper says, in its words; "-" where it says nothing
+  std::string metric;  ///< see metrics.h
+  std::string paper;   ///< what the paper says, in its words; "-" where it says nothing
   Judge judge;
   std::optional<double> min;
   std::optional<double> max;
@@ -97,8 +98,8 @@ struct Scenario {
   std::vector<Goal> goals;
 };
 
-/// Reads a scenario; folders in it are relative to the file. Throws config::ConfigError naming file, key,
-/// unit and range.
+/// Reads a scenario; folders in it are relative to the file. Throws config::ConfigError naming file,
+/// key, unit and range.
 Scenario loadScenario(const std::string& file);
 
 /// The lane-change path of an experiment, in the map frame from the origin along x: straights joined by

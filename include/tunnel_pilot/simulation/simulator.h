@@ -61,10 +61,11 @@ struct Contact {
 /// contact is told and counted, and the truck drives on through the wall.
 class Simulator {
  public:
-  /// `plant` is what moves; the truck's parameters give its geometry. The bus must outlive the simulator.
+  /// `plant` is what moves; the truck's parameters give its geometry. The bus must outlive the
+  /// simulator.
   Simulator(const SimulatorParameters& parameters, const TruckControllerParameters& controller,
-            const vehicle::TruckParameters& truck, std::unique_ptr<vehicle::Plant> plant, vehicle::Load load,
-            world::World world, std::uint64_t seed, can::Bus& bus);
+            const vehicle::TruckParameters& truck, std::unique_ptr<vehicle::Plant> plant,
+            vehicle::Load load, world::World world, std::uint64_t seed, can::Bus& bus);
   Simulator(const Simulator&) = delete;
   Simulator& operator=(const Simulator&) = delete;
 
@@ -142,7 +143,7 @@ class Simulator {
 
   bool lidar_alive_ = true;
   bool sweeping_ = false;
-  std::int64_t sweeps_ = 0;    ///< begun so far
+  std::int64_t sweeps_ = 0;  ///< begun so far
   Stamp sweep_stamp_{};
   geometry::Pose sweep_start_;
   Truth sweep_truth_;
