@@ -159,7 +159,7 @@ void Chart::drawAxes(cv::Mat& image, const Frame& frame) const {
   putText(image, title_, box.x, box.y - 14 * kOversampling, 0.62, colour::kInk, kOversampling + 1);
   const double label_left = box.x + 0.5 * (box.width - textSize(x_label_, kFontHeight).width);
   putText(image, x_label_, label_left, box.br().y + 42 * kOversampling, kFontHeight, colour::kInk);
-  putTextUpwards(image, y_label_, 16 * kOversampling, box.y + box.height / 2);
+  putTextUpwards(image, y_label_, 16 * kOversampling, box.y + 0.5 * box.height);
 }
 
 void Chart::drawAreas(cv::Mat& image, const Frame& frame) const {

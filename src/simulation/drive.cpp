@@ -51,7 +51,7 @@ class Drive : public ClosedLoop {
     while (true) {
       step();
       if (simulator_.truth().station - start >= way) return kCompleted;
-      const std::string why = whyOver(drive_.time_limit);
+      std::string why = whyOver(drive_.time_limit);
       if (!why.empty()) return why;
     }
   }

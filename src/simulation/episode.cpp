@@ -42,7 +42,7 @@ EpisodeResult runExperiment(const Scenario& scenario, const Setup& setup, const 
         } else if constexpr (std::is_same_v<Kind, LaneChangeExperiment>) {
           return runLaneChange(experiment, scenario, setup, plan.seed);
         } else {
-          return runPerception(experiment, scenario, setup, plan.seed, plan.reversed);
+          return runPerception(experiment, setup, plan.seed, plan.reversed);
         }
       },
       scenario.experiment);

@@ -22,7 +22,7 @@ EpisodeResult runSteadyTurn(const SteadyTurnExperiment& turn, const Scenario& sc
                             const Setup& setup, std::uint64_t seed);
 EpisodeResult runLaneChange(const LaneChangeExperiment& change, const Scenario& scenario,
                             const Setup& setup, std::uint64_t seed);
-EpisodeResult runPerception(const PerceptionExperiment& perception, const Scenario& scenario,
-                            const Setup& setup, std::uint64_t seed, bool reversed);
+EpisodeResult runPerception(const PerceptionExperiment& experiment, const Setup& setup,
+                            std::uint64_t seed, bool reversed);
 
 }  // namespace tunnel_pilot::simulation

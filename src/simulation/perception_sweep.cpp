@@ -1,4 +1,6 @@
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include "experiments.h"
 #include "tunnel_pilot/vehicle/articulation.h"
@@ -76,6 +78,75 @@ TrackSample trackSample(const Truth& truth, const vehicle::TruckGeometry& truck,
   return sample;
 }
 
+// One episode: the truck led along the line, its lidar, and the perception.
+class Sweep {
+ public:
+  Sweep(const PerceptionExperiment& experiment, const Setup& setup, std::uint64_t seed, bool reversed)
+      : experiment_(experiment),
+        truck_(setup.truck.geometry),
+        sensor_{truck_.lidar_x, truck_.lidar_y, 0.0},
+        world_(world::loadWorld(experiment.world_file, {seed, reversed})),
+        period_(1.0 / setup.simulator.lidar.rate),
+        latency_(fromSeconds(setup.simulator.lidar.latency)),
+        caster_(world_.walls, LidarModel::beams(setup.simulator.lidar)),
+        lidar_(setup.simulator.lidar, seed),
+        chain_(setup.pilot.perception),
+        odometry_(setup.simulator, seed),
+        weave_(world_.design_line, experiment) {}
+
+  EpisodeResult run() {
+    const geometry::Path& line = world_.design_line;
+    const double start = line.closed() ? 0.0 : kStart;
+    const double rest = line.closed() ? line.length() : line.length() - kOpenEnd - start;
+    const double way = experiment_.distance > 0.0 ? experiment_.distance : rest;
+    for (int i = 0; experiment_.speed * period_ * i < way; ++i) {
+      takeScan(start + experiment_.speed * period_ * i, fromSeconds(period_ * i));
+    }
+    result_.metrics = perceptionMetrics(result_.perception);
+    result_.ending = "way swept";
+    result_.line = line;
+    result_.walls = world_.walls;
+    return std::move(result_);
+  }
+
+ private:
+  void takeScan(double station, Stamp stamp) {
+    const Truth truth = weave_.at(station, stamp);
+    const geometry::Pose& pose = truth.state.pose;
+    const double sweep = experiment_.speed * lidar_.sweepDuration();
+    const geometry::Pose later = weave_.at(station + sweep, stamp).state.pose;
+    const geometry::Scan& scan =
+        lidar_.sweep(caster_, pose.compose(sensor_), later.compose(sensor_), truck_.lidar_z, 0.0, stamp);
+    const geometry::Pose moved = last_pose_ ? last_pose_->relative(pose) : geometry::Pose{};
+    const geometry::Pose odom = odometry_.update(moved, last_pose_ ? period_ : 0.0);
+    const perception::Tunnel* tunnel = chain_.update(scan, sensor_, odom, stamp + latency_);
+    const perception::TunnelState state = tunnel != nullptr ? tunnel->state : perception::TunnelState{};
+    result_.perception.push_back(comparePerception(state, truth, world_.width));
+    const double way = std::hypot(moved.x, moved.y);
+    if (way > 0.0) {
+      articulation_ += way * vehicle::articulationSlope(truck_, moved.heading / way, articulation_);
+    }
+    result_.track.push_back(
+        trackSample(truth, truck_, toSeconds(stamp), articulation_, experiment_.speed));
+    last_pose_ = pose;
+  }
+
+  PerceptionExperiment experiment_;
+  vehicle::TruckGeometry truck_;
+  geometry::Pose sensor_;
+  world::World world_;
+  double period_;  // [s]
+  Stamp latency_;
+  world::RayCaster caster_;
+  LidarModel lidar_;
+  PerceptionChain chain_;
+  SensedOdometry odometry_;
+  Weave weave_;
+  std::optional<geometry::Pose> last_pose_;
+  double articulation_ = 0.0;  // with which the rear body follows [rad]
+  EpisodeResult result_;
+};
+
 }  // namespace
 
 PerceptionSample comparePerception(const perception::TunnelState& measured, const Truth& truth,
@@ -93,51 +164,9 @@ PerceptionSample comparePerception(const perception::TunnelState& measured, cons
   return sample;
 }
 
-EpisodeResult runPerception(const PerceptionExperiment& experiment, const Scenario&, const Setup& setup,
+EpisodeResult runPerception(const PerceptionExperiment& experiment, const Setup& setup,
                             std::uint64_t seed, bool reversed) {
-  const world::World world = world::loadWorld(experiment.world_file, {seed, reversed});
-  const geometry::Path& line = world.design_line;
-  const vehicle::TruckGeometry& truck = setup.truck.geometry;
-  const geometry::Pose sensor{truck.lidar_x, truck.lidar_y, 0.0};
-  const world::RayCaster caster(world.walls, LidarModel::beams(setup.simulator.lidar));
-  LidarModel lidar(setup.simulator.lidar, seed);
-  PerceptionChain chain(setup.pilot.perception);
-  SensedOdometry odometry(setup.simulator, seed);
-  const Weave weave(line, experiment);
-
-  const double period = 1.0 / setup.simulator.lidar.rate;
-  const double start = line.closed() ? 0.0 : kStart;
-  const double end = experiment.distance > 0.0 ? start + experiment.distance
-                     : line.closed()           ? line.length()
-                                               : line.length() - kOpenEnd;
-  EpisodeResult result;
-  geometry::Pose last = weave.at(start, {}).state.pose;
-  double articulation = 0.0;
-  for (int i = 0; start + experiment.speed * period * i < end; ++i) {
-    const Stamp stamp = fromSeconds(period * i);
-    const double station = start + experiment.speed * period * i;
-    const Truth truth = weave.at(station, stamp);
-    const geometry::Pose later =
-        weave.at(station + experiment.speed * lidar.sweepDuration(), stamp).state.pose;
-    const geometry::Scan& scan = lidar.sweep(caster, truth.state.pose.compose(sensor),
-                                             later.compose(sensor), truck.lidar_z, 0.0, stamp);
-    const geometry::Pose moved = last.relative(truth.state.pose);
-    const geometry::Pose odom = odometry.update(moved, i == 0 ? 0.0 : period);
-    const perception::Tunnel* tunnel =
-        chain.update(scan, sensor, odom, stamp + fromSeconds(setup.simulator.lidar.latency));
-    result.perception.push_back(comparePerception(
-        tunnel != nullptr ? tunnel->state : perception::TunnelState{}, truth, world.width));
-    const double way = std::hypot(moved.x, moved.y);
-    if (way > 0.0)
-      articulation += way * vehicle::articulationSlope(truck, moved.heading / way, articulation);
-    result.track.push_back(trackSample(truth, truck, period * i, articulation, experiment.speed));
-    last = truth.state.pose;
-  }
-  result.metrics = perceptionMetrics(result.perception);
-  result.ending = "way swept";
-  result.line = line;
-  result.walls = world.walls;
-  return result;
+  return Sweep(experiment, setup, seed, reversed).run();
 }
 
 }  // namespace tunnel_pilot::simulation

@@ -183,6 +183,7 @@ void writeSummary(const std::filesystem::path& folder, const Scenario& scenario,
 std::vector<const EpisodeResult*> pictured(const Scenario& scenario,
                                            const std::vector<EpisodeResult>& episodes) {
   std::vector<const EpisodeResult*> order;
+  order.reserve(episodes.size());
   for (const EpisodeResult& episode : episodes) order.push_back(&episode);
   const Goal& goal = scenario.goals.front();
   std::stable_sort(order.begin(), order.end(), [&](const EpisodeResult* a, const EpisodeResult* b) {

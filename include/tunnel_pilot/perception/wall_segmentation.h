@@ -59,7 +59,7 @@ WallSegmentationParameters loadWallSegmentation(config::Node node);
 class WallSegmentation : public pcl::PCLBase<pcl::PointXYZ> {
  public:
   explicit WallSegmentation(const WallSegmentationParameters& parameters);
-  ~WallSegmentation();
+  ~WallSegmentation() override;
   WallSegmentation(const WallSegmentation&) = delete;
   WallSegmentation& operator=(const WallSegmentation&) = delete;
 
