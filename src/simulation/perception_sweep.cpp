@@ -121,7 +121,7 @@ class Sweep {
     const geometry::Pose odom = odometry_.update(moved, last_pose_ ? period_ : 0.0);
     const perception::Tunnel* tunnel = chain_.update(scan, sensor_, odom, stamp + latency_);
     const perception::TunnelState state = tunnel != nullptr ? tunnel->state : perception::TunnelState{};
-    result_.perception.push_back(comparePerception(state, truth, world_.width));
+    result_.perception.push_back(comparePerception(state, truth, world_.widthAt(truth.station)));
     const double way = std::hypot(moved.x, moved.y);
     if (way > 0.0) {
       articulation_ += way * vehicle::articulationSlope(truck_, moved.heading / way, articulation_);
