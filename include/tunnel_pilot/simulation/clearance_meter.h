@@ -18,6 +18,13 @@ class ClearanceMeter {
   /// infinity without walls.
   double clearance(const std::vector<geometry::Point>& outline) const;
 
+  /// A straight edge, ready for distances to it; of no length, its inverse is 0.
+  struct Edge {
+    geometry::Point start;
+    geometry::Point along;          ///< from start to end [m]
+    double inverse_squared_length;  ///< [1/m^2]
+  };
+
  private:
   struct Circle {
     geometry::Point centre;
@@ -25,12 +32,13 @@ class ClearanceMeter {
   };
   struct Segment {
     Circle circle;
-    geometry::Point a, b;
+    Edge edge;
   };
   struct Chunk {
     Circle circle;
     std::vector<Segment> segments;
   };
+  static Edge edgeBetween(const geometry::Point& a, const geometry::Point& b);
   static Circle boundingCircle(const geometry::Point* points, std::size_t count);
 
   std::vector<Chunk> chunks_;
