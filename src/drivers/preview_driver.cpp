@@ -47,7 +47,8 @@ PreviewDriverParameters loadPreviewDriver(config::Node node) {
   config::Node weights = node.child("weights");
   p.weights.offset = weights.number("offset", "1/m^2", 1e-3, 1e3);
   p.weights.heading = weights.number("heading", "1/rad^2", 0.0, 1e4);
-  p.weights.rate = weights.number("rate", "s^2/rad^2", 1e-3, 1e4);
+  p.weights.slope = weights.number("slope", "m^2/rad^2", 1e-2, 1e5);
+  p.weights.slope_speed = weights.number("slope_speed", "m/s", 0.1, 10.0);
   p.weights.terminal = weights.number("terminal", "1", 1.0, 1e3);
   p.weights.rate_share = weights.number("rate_share", "1", 0.3, 1.0);
   weights.finish();

@@ -122,6 +122,7 @@ double PreviewPlanner::roll(const PathState& now, const geometry::Path& path, do
   PathState state = now;
   double heading = cursor.headingAt(state.s);
   double sum = 0.0;
+  const double rate_weight = rateWeight(speed);
   const double least_step = 0.1 * speed * step_;
   for (std::size_t k = 0; k < kStages; ++k) {
     if (correction > 0.0) {
@@ -138,8 +139,8 @@ double PreviewPlanner::roll(const PathState& now, const geometry::Path& path, do
     state = advance(state, rates_[k], speed, curvatures_[k], believed, step_);
     heading = cursor.headingAt(state.s);
     const double factor = k + 1 == kStages ? weights_.terminal : 1.0;
-    sum += factor * stageCost(state, curvatures_[k], speed, believed) +
-           weights_.rate * rates_[k] * rates_[k];
+    sum +=
+        factor * stageCost(state, curvatures_[k], speed, believed) + rate_weight * rates_[k] * rates_[k];
   }
   states_[kStages] = state;
   return sum;
@@ -151,6 +152,7 @@ void PreviewPlanner::sweep(double speed, const YawResponse& believed) {
     const double course = state.heading_error - courseOffset(speed, curvatures_[k], believed);
     return Vector(factor * weights_.offset * state.offset, factor * weights_.heading * course, 0.0, 0.0);
   };
+  const double rate_weight = rateWeight(speed);
   Vector value = Vector::Zero();
   Eigen::Matrix4d curvature_of_value = Eigen::Matrix4d::Zero();
   for (std::size_t k = kStages; k-- > 0;) {
@@ -161,8 +163,8 @@ void PreviewPlanner::sweep(double speed, const YawResponse& believed) {
 
     const Linear linear = linearise(states_[k], rates_[k], speed, curvatures_[k], believed);
     const Vector by_rate = curvature_of_value * linear.rate;
-    const double slope = weights_.rate * rates_[k] + value.dot(linear.rate);
-    const double bend = weights_.rate + linear.rate.dot(by_rate);
+    const double slope = rate_weight * rates_[k] + value.dot(linear.rate);
+    const double bend = rate_weight + linear.rate.dot(by_rate);
     const Vector mixed = linear.state.transpose() * by_rate;
     const double free_correction = -slope / bend;
     corrections_[k] = std::clamp(free_correction, -rateLimit(k) - rates_[k], rateLimit(k) - rates_[k]);

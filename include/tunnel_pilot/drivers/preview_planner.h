@@ -36,15 +36,16 @@ struct YawResponse {
 };
 
 struct PreviewWeights {
-  double offset;      ///< [1/m^2]
-  double heading;     ///< [1/rad^2]
-  double rate;        ///< of the command's rate [s^2/rad^2]
-  double terminal;    ///< factor on offset and heading at the horizon's end [1]
-  double rate_share;  ///< of max_rate that is planned with late in the horizon [1]
+  double offset;       ///< [1/m^2]
+  double heading;      ///< [1/rad^2]
+  double slope;        ///< of the command's change over the way driven [m^2/rad^2]
+  double slope_speed;  ///< lowest v that the slope is counted with [m/s]
+  double terminal;     ///< factor on offset and heading at the horizon's end [1]
+  double rate_share;   ///< of max_rate that is planned with late in the horizon [1]
 };
 
 /// Optimal preview: finds the command rates w over the horizon that minimise
-///   sum of  q_y e_y^2 + q_psi (e_psi + beta)^2 + r w^2
+///   sum of  q_y e_y^2 + q_psi (e_psi + beta)^2 + r (w / max(v, v_0))^2
 /// along the previewed path, under |w| <= max_rate (later in the horizon less, which leaves room for
 /// what the model does not know), for the truck's exact kinematics
 ///   theta_dot = (g v sin(gamma) + l_r gamma_dot) / (l_f cos(gamma) + l_r) + v d
@@ -88,6 +89,10 @@ class PreviewPlanner {
   void sweep(double speed, const YawResponse& believed);
   Linear linearise(const PathState& state, double rate, double speed, double curvature,
                    const YawResponse& believed) const;
+  double rateWeight(double speed) const {
+    const double v = std::max(speed, weights_.slope_speed);
+    return weights_.slope / (v * v);
+  }
   double rateLimit(std::size_t stage) const {
     return truck_.max_rate * std::max(weights_.rate_share, 1.0 - 0.10 * static_cast<double>(stage));
   }
