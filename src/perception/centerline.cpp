@@ -108,8 +108,9 @@ TunnelReason CenterlineEstimator::measure(const Walls& walls) {
   if (!walls.left.found && !walls.right.found) {
     return walls.enough_returns ? TunnelReason::kNoWalls : TunnelReason::kTooFewPoints;
   }
-  const double residual = std::max(walls.left.residual, walls.right.residual);
-  if (!(residual <= parameters_.residual_max)) return TunnelReason::kPoorFit;
+  for (const Wall* wall : {&walls.left, &walls.right}) {
+    if (wall->found && !(wall->residual <= parameters_.residual_max)) return TunnelReason::kPoorFit;
+  }
   const std::vector<Point>& left = walls.left.curve;
   const std::vector<Point>& right = walls.right.curve;
   const std::size_t pairs = std::min(left.size(), right.size());

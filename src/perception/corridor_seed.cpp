@@ -51,8 +51,9 @@ void CorridorSeeder::vote(float heading, float curvature) {
     const float v = c * y_[i] - s * x_[i];
     const float f = v - 0.5F * curvature * (u * u + v * v);
     const float d = 2.0F * f / (1.0F + std::sqrt(std::max(0.0F, 1.0F - 2.0F * curvature * f)));
-    const int bin = static_cast<int>(std::min(std::abs(d) * per_bin, static_cast<float>(kBins)));
-    if (bin < kBins) (d > 0.0F ? left_ : right_)[bin + 1] += 1.0F;
+    const float bin = std::abs(d) * per_bin;
+    if (!(bin < static_cast<float>(kBins))) continue;  // too far away, or not a number any more
+    (d > 0.0F ? left_ : right_)[static_cast<int>(bin) + 1] += 1.0F;
   }
 }
 

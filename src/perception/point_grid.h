@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -26,7 +27,9 @@ struct SliceFrame {
 /// Point groups hashed into a grid of square cells (lists threaded through an array).
 class PointGrid {
  public:
-  /// Replaces the content. Groups outside the grid (far behind or far away) are left out.
+  static constexpr std::size_t kMaxGroups = 32767;
+
+  /// Replaces the content, at most kMaxGroups. Groups outside the grid (far behind or far away) are left out.
   void fill(const std::vector<PointGroup>& groups);
 
   /// Calls visit(group index, along, lateral) for each group whose place in `frame` lies in

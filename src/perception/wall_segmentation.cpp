@@ -192,6 +192,7 @@ void WallSegmentation::Impl::group(const pcl::PointCloud<pcl::PointXYZ>& cloud,
     if (gap_squared != gap_squared) continue;  // a coordinate is NaN
     if (gap_squared > reach_squared) {
       if (!std::isfinite(point.x) || !std::isfinite(point.y)) continue;
+      if (groups.size() == PointGrid::kMaxGroups) break;
       x0 = point.x;
       y0 = point.y;
       groups.push_back({x0, y0, count, count});
@@ -248,10 +249,14 @@ bool WallSegmentation::Impl::vote(double to_beat) {
   return std::max(near_total, far_total) > to_beat;
 }
 
+// Twice, since a seed is coarse: the second time from where the first found the tunnel to begin.
 void WallSegmentation::Impl::followSeed(const CorridorSeed& seed) {
   const bool paired = seed.left && seed.right;
-  follow(startOf(seed), {0.3, 0.15, 0.05, paired ? 0.3 : 1e-3}, seed.left.has_value(),
-         seed.right.has_value());
+  CorridorNode start = startOf(seed);
+  for (int pass = 0; pass < 2; ++pass) {
+    follow(start, {0.3, 0.15, 0.05, paired ? 0.3 : 1e-3}, seed.left.has_value(), seed.right.has_value());
+    start = smoother.node(0);
+  }
 }
 
 bool WallSegmentation::Impl::followGuess(Stamp stamp) {
