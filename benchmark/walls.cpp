@@ -163,13 +163,13 @@ double pclChain(const Sample& sample) {
   Cloud::Ptr cloud = cloudOf(sample.scan);
   pcl::VoxelGrid<pcl::PointXYZ> voxels;
   voxels.setInputCloud(cloud);
-  voxels.setLeafSize(0.1F, 0.1F, 0.1F);
+  voxels.setLeafSize(0.05F, 0.05F, 0.05F);
   Cloud::Ptr thinned(new Cloud);
   voxels.filter(*thinned);
   pcl::StatisticalOutlierRemoval<pcl::PointXYZ> outliers;
   outliers.setInputCloud(thinned);
-  outliers.setMeanK(10);
-  outliers.setStddevMulThresh(2.0);
+  outliers.setMeanK(50);  // as in PCL's own tutorial
+  outliers.setStddevMulThresh(1.0);
   Cloud::Ptr rest(new Cloud);
   outliers.filter(*rest);
   double heading = 0.0;

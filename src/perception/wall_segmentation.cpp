@@ -31,8 +31,9 @@ constexpr double kTrackedSupport = 0.6;
 constexpr double kPairedSupport = 0.35;
 constexpr int kScansToRevise = 10;       // with one wall alone
 constexpr double kRevisionMargin = 0.05;
+constexpr double kCollapse = 0.75;       // of what the last scan saw: then the guess is revised at once
 constexpr double kWidthDeviationMin = 0.03;  // [m] of the last scan's half width
-constexpr double kWidthDeviationMax = 0.10;  // [m]
+constexpr double kWidthDeviationMax = 0.15;  // [m]
 constexpr Stamp kGuessAge = std::chrono::milliseconds(500);
 constexpr std::array<double, 2> kSides = {1.0, -1.0};
 
@@ -116,6 +117,7 @@ struct WallSegmentation::Impl {
   Stamp guess_stamp{};
   double guess_width_deviation = 0.0;                // of its half width [m]
   bool guess_held = false;                           // the present walls were found with its help
+  double last_total = 0.0;                           // of the last scan that held the guess
   int unpaired_scans = 0;                            // for which one wall alone held the guess
 
   void find(Stamp stamp);
@@ -213,7 +215,9 @@ void WallSegmentation::Impl::find(Stamp stamp) {
   if (guess_held) {
     const Support held = support();
     unpaired_scans = held.worse >= kPairedSupport ? 0 : unpaired_scans + 1;
-    const bool revise = unpaired_scans > 0 && unpaired_scans % kScansToRevise == 0;
+    const bool collapsed = unpaired_scans > 0 && held.total < kCollapse * last_total;
+    const bool revise = collapsed || (unpaired_scans > 0 && unpaired_scans % kScansToRevise == 0);
+    last_total = held.total;
     if (held.better >= kTrackedSupport && !revise) return;
     to_beat = held.total + kRevisionMargin;
   }
@@ -283,7 +287,10 @@ void WallSegmentation::Impl::keepGuess(Stamp stamp, const Walls& walls) {
     next.position += shift * next.direction.left();
     next.half_width = guess->half_width;
   } else {
-    const double deviation = std::sqrt(smoother.covariance(first)(3, 3));
+    // Where the tunnel widens, the next scan meets what the next slice shows.
+    const std::size_t ahead = std::min(first + 1, smoother.size() - 1);
+    const double change = std::abs(smoother.node(ahead).half_width - next.half_width);
+    const double deviation = std::max(std::sqrt(smoother.covariance(first)(3, 3)), 0.5 * change);
     guess_width_deviation = std::clamp(deviation, kWidthDeviationMin, kWidthDeviationMax);
   }
   next.move(-p.step * static_cast<double>(first));
