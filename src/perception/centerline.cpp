@@ -13,6 +13,7 @@ using geometry::Point;
 using geometry::Pose;
 
 constexpr double kSeenComing = 2.5;     // [m] along the tunnel, between a width expected and met
+constexpr double kPathBehind = 1.5;     // [m] of the path's begin behind the reference point
 constexpr double kCurveStep = 0.5;  // [m] between samples of the walls' curves
 constexpr std::size_t kFewestInFit = 4;  // nodes in a parabola's window
 
@@ -271,7 +272,10 @@ void CenterlineEstimator::fitPath() {
   fit_->clear();
   for (const Node& node : nodes_) fit_->add(node.position);
   path_.clear();
-  for (std::size_t i = 0; i < nodes_.size(); ++i) {
+  // Nodes farther behind only bear on the fit beside the reference point.
+  std::size_t begin = 0;
+  while (begin + kFewestInFit < nodes_.size() && nodes_[begin].position.x() < -kPathBehind) ++begin;
+  for (std::size_t i = begin; i < nodes_.size(); ++i) {
     const auto [first, last] = fitWindow(i);
     const ArcLengthFit::Parabola parabola = fit_->fit(first, last, fit_->s(i));
     const Point& place = parabola.place;

@@ -40,10 +40,10 @@ class PointGrid {
 
  private:
   static constexpr float kCell = 1.0F;  // [m]
-  static constexpr int kSizeX = 80;
-  static constexpr int kSizeY = 96;
-  static constexpr float kFirstX = -30.0F;  // [m]
-  static constexpr float kFirstY = -48.0F;  // [m]
+  static constexpr int kSizeX = 64;
+  static constexpr int kSizeY = 64;
+  static constexpr float kFirstX = -22.0F;  // [m]
+  static constexpr float kFirstY = -32.0F;  // [m]
 
   // Cells count from one, so that truncation puts all that lies before the grid into column or row 0.
   static int column(float x) { return static_cast<int>(std::max(x - kFirstX, -kCell) / kCell + 1.0F); }

@@ -281,20 +281,20 @@ void ScanFilter::resample(std::vector<float>& ranges) const {
 }
 
 void ScanFilter::fillGaps(std::vector<float>& ranges) const {
-  const int size = static_cast<int>(ranges.size());
-  const int widest = static_cast<int>(parameters_.gap_max / kNetworkIncrement);
-  int last = -1;  // last beam with a return
-  for (int i = 0; i < size; ++i) {
-    if (!std::isfinite(ranges[static_cast<std::size_t>(i)])) continue;
-    const int gap = i - last - 1;
-    if (last >= 0 && gap > 0 && gap <= widest) {
-      const float from = ranges[static_cast<std::size_t>(last)];
-      const float step = (ranges[static_cast<std::size_t>(i)] - from) / static_cast<float>(gap + 1);
-      for (int j = 1; j <= gap; ++j) {
-        ranges[static_cast<std::size_t>(last + j)] = from + static_cast<float>(j) * step;
-      }
+  const std::size_t size = ranges.size();
+  const auto widest = static_cast<std::size_t>(parameters_.gap_max / kNetworkIncrement);
+  const auto missing = [&](std::size_t i) { return !(ranges[i] < kInfinity); };
+  for (std::size_t first = 0; first < size; ++first) {
+    if (!missing(first)) continue;
+    std::size_t end = first + 1;
+    while (end < size && missing(end)) ++end;
+    const std::size_t gap = end - first;
+    if (first > 0 && end < size && gap <= widest) {
+      const float from = ranges[first - 1];
+      const float step = (ranges[end] - from) / static_cast<float>(gap + 1);
+      for (std::size_t j = 0; j < gap; ++j) ranges[first + j] = from + static_cast<float>(j + 1) * step;
     }
-    last = i;
+    first = end;
   }
 }
 

@@ -538,7 +538,9 @@ void WallSegmentation::Impl::collectInliers(const pcl::PointCloud<pcl::PointXYZ>
   }
   const auto reach = static_cast<float>(p.inlier_distance);
   const std::vector<std::int8_t>& node_of = taken[side];
-  double sum = 0.0;
+  wall.indices.resize(order.size());
+  std::size_t count = 0;
+  float sum = 0.0F;
   for (std::size_t g = 0; g < groups.size(); ++g) {
     if (node_of[g] < 0) continue;
     const Line& n = lines[static_cast<std::size_t>(node_of[g])];
@@ -549,12 +551,14 @@ void WallSegmentation::Impl::collectInliers(const pcl::PointCloud<pcl::PointXYZ>
       const float dy = point.y - n.frame.y;
       const float along = n.frame.cosine * dx + n.frame.sine * dy;
       const float miss = n.frame.cosine * dy - n.frame.sine * dx - n.offset - n.half_bend * along * along;
-      if (std::abs(miss) > reach) continue;
-      sum += static_cast<double>(miss * miss);
-      wall.indices.push_back(index);
+      const bool on_wall = std::abs(miss) <= reach;
+      wall.indices[count] = index;
+      count += on_wall ? 1 : 0;
+      sum += on_wall ? miss * miss : 0.0F;
     }
   }
-  if (!wall.indices.empty()) wall.residual = std::sqrt(sum / static_cast<double>(wall.indices.size()));
+  wall.indices.resize(count);
+  if (count > 0) wall.residual = std::sqrt(static_cast<double>(sum) / static_cast<double>(count));
 }
 
 }  // namespace tunnel_pilot::perception
