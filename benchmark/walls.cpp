@@ -1,19 +1,8 @@
-// From a scan to the tunnel's heading: our scan filter, walls and centerline, beside PCL's usual chain (voxel
-// grid, statistical outlier removal, two RANSAC lines, Euclidean clusters) and OpenCV's lines. The drift
-// has bends of 12 to 16 m radius and rough walls; every method is asked for the tunnel's direction beside
-// the front axle, and its error there is told beside its time.
+// From a scan to the tunnel's heading: our scan filter, walls and centerline, beside PCL's usual chain
+// (voxel grid, statistical outlier removal, two RANSAC lines, Euclidean clusters) and OpenCV's lines.
+// The drift has bends of 12 to 16 m radius and rough walls; every method is asked for the tunnel's
+// direction beside the front axle, and its error there is told beside its time.
 
-#include <algorithm>
-#include <cmath>
-#include <cstdio>
-#include <functional>
-#include <limits>
-#include <random>
-#include <string>
-#include <utility>
-#include <vector>
-
-#include <opencv2/imgproc.hpp>
 #include <pcl/ModelCoefficients.h>
 #include <pcl/filters/extract_indices.h>
 #include <pcl/filters/statistical_outlier_removal.h>
@@ -21,6 +10,17 @@
 #include <pcl/search/kdtree.h>
 #include <pcl/segmentation/extract_clusters.h>
 #include <pcl/segmentation/sac_segmentation.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "harness.h"
 #include "tunnel_pilot/perception/centerline.h"
@@ -37,16 +37,16 @@ using geometry::Pose;
 
 constexpr int kBeams = 761;
 constexpr double kDegree = M_PI / 180.0;
-constexpr double kHalfWidth = 2.5;       // [m]
-constexpr double kStep = 0.09;           // [m] between scans: 35 Hz at 3 m/s
+constexpr double kHalfWidth = 2.5;  // [m]
+constexpr double kStep = 0.09;      // [m] between scans: 35 Hz at 3 m/s
 const Pose kLidar{1.6, 0.0, 0.0};
 
 // A scan with the truth it was taken at.
 struct Sample {
   geometry::Scan scan;
-  Pose pose;                // of the front axle in the map
-  double heading = 0.0;     // truck heading minus tunnel direction [rad]
-  double curvature = 0.0;   // of the tunnel [1/m]
+  Pose pose;               // of the front axle in the map
+  double heading = 0.0;    // truck heading minus tunnel direction [rad]
+  double curvature = 0.0;  // of the tunnel [1/m]
 };
 
 // Walls beside a line, with a deviation of 0.05 m correlated over about 2 m.
@@ -76,11 +76,18 @@ std::vector<Sample> drive() {
   std::mt19937_64 random(3);
   const double k12 = 1.0 / 12.0;
   const double k16 = 1.0 / 16.0;
-  const geometry::Path line = geometry::buildPath(
-      {{30.0, 0.0, 0.0}, {8.0, 0.0, k12}, {12.0, k12, k12}, {8.0, k12, 0.0}, {20.0, 0.0, 0.0},
-       {10.0, 0.0, -k16}, {16.0, -k16, -k16}, {10.0, -k16, 0.0}, {60.0, 0.0, 0.0}},
-      {}, 0.5);
-  const std::vector<world::WallChain> walls = {roughWall(line, 1.0, random), roughWall(line, -1.0, random)};
+  const geometry::Path line = geometry::buildPath({{30.0, 0.0, 0.0},
+                                                   {8.0, 0.0, k12},
+                                                   {12.0, k12, k12},
+                                                   {8.0, k12, 0.0},
+                                                   {20.0, 0.0, 0.0},
+                                                   {10.0, 0.0, -k16},
+                                                   {16.0, -k16, -k16},
+                                                   {10.0, -k16, 0.0},
+                                                   {60.0, 0.0, 0.0}},
+                                                  {}, 0.5);
+  const std::vector<world::WallChain> walls = {roughWall(line, 1.0, random),
+                                               roughWall(line, -1.0, random)};
   const world::RayCaster caster(walls, {-95.0 * kDegree, 0.25 * kDegree, kBeams, 40.0});
   std::normal_distribution<float> noise(0.0F, 0.012F);
   std::vector<Sample> samples;
@@ -105,7 +112,8 @@ std::vector<Sample> drive() {
   return samples;
 }
 
-// --- ours ----------------------------------------------------------------------------------------------------
+// --- ours
+// ----------------------------------------------------------------------------------------------------
 
 class Ours {
  public:
@@ -117,7 +125,8 @@ class Ours {
   double heading(const Sample& sample) {
     if (sample.scan.stamp < last_) reset();
     last_ = sample.scan.stamp;
-    const perception::ScanFilter::Result& filtered = filter_.filter(sample.scan, kLidar, sample.scan.stamp);
+    const perception::ScanFilter::Result& filtered =
+        filter_.filter(sample.scan, kLidar, sample.scan.stamp);
     segmentation_.setInputCloud(filtered.points);
     const perception::Walls& walls = segmentation_.segment(sample.scan.stamp);
     const perception::TunnelState& state = centerline_.update(walls, sample.pose).state;
@@ -140,7 +149,8 @@ class Ours {
   Stamp last_{};
 };
 
-// --- peers ---------------------------------------------------------------------------------------------------
+// --- peers
+// ---------------------------------------------------------------------------------------------------
 
 Cloud::Ptr cloudOf(const geometry::Scan& scan) {
   Cloud::Ptr cloud(new Cloud);
@@ -216,7 +226,8 @@ double houghLines(const Sample& sample) {
   for (const pcl::PointXYZ& p : cloud->points) {
     const int column = static_cast<int>(p.x / kPixel);
     const int row = static_cast<int>(p.y / kPixel) + kSize / 2;
-    if (column >= 0 && column < kSize && row >= 0 && row < kSize) picture.at<unsigned char>(row, column) = 255;
+    if (column >= 0 && column < kSize && row >= 0 && row < kSize)
+      picture.at<unsigned char>(row, column) = 255;
   }
   std::vector<cv::Vec4i> lines;
   cv::HoughLinesP(picture, lines, 1.0, CV_PI / 180.0, 20, 20.0, 10.0);
@@ -252,7 +263,8 @@ double fitLines(const Sample& sample) {
   return -heading;
 }
 
-// --- errors --------------------------------------------------------------------------------------------------
+// --- errors
+// --------------------------------------------------------------------------------------------------
 
 struct Error {
   double median = 0.0;  // [degree]
@@ -260,7 +272,8 @@ struct Error {
 };
 
 // Heading errors in bends, over the whole drive; a missing answer counts as 90 degrees.
-Error errorInBends(const std::vector<Sample>& samples, const std::function<double(const Sample&)>& method) {
+Error errorInBends(const std::vector<Sample>& samples,
+                   const std::function<double(const Sample&)>& method) {
   std::vector<double> errors;
   for (const Sample& sample : samples) {
     const double heading = method(sample);
@@ -298,8 +311,8 @@ int main(int argc, char** argv) {
   contest.tell("OpenCV fitLine (Huber)", "ours");
   for (const auto& [name, method] : methods) {
     const Error error = errorInBends(samples, method);
-    std::printf("heading error in bends of 12-16 m radius: %s %.2f degrees median, %.2f p95\n", name.c_str(),
-                error.median, error.p95);
+    std::printf("heading error in bends of 12-16 m radius: %s %.2f degrees median, %.2f p95\n",
+                name.c_str(), error.median, error.p95);
     if (name != "ours") continue;
     contest.requireAtMost("heading error in bends, median", "degree", error.median, 2.0);
     contest.requireAtMost("heading error in bends, p95", "degree", error.p95, 5.5);

@@ -23,8 +23,8 @@ ArcLengthFit::Parabola ArcLengthFit::fit(std::size_t first, std::size_t last, do
   const double t1 = m[1] - s0 * n;
   const double t2 = m[2] - 2.0 * s0 * m[1] + s0 * s0 * n;
   const double t3 = m[3] - 3.0 * s0 * m[2] + 3.0 * s0 * s0 * m[1] - s0 * s0 * s0 * n;
-  const double t4 = m[4] - 4.0 * s0 * m[3] + 6.0 * s0 * s0 * m[2] - 4.0 * s0 * s0 * s0 * m[1] +
-                    s0 * s0 * s0 * s0 * n;
+  const double t4 =
+      m[4] - 4.0 * s0 * m[3] + 6.0 * s0 * s0 * m[2] - 4.0 * s0 * s0 * s0 * m[1] + s0 * s0 * s0 * s0 * n;
   // Inverse of the symmetric matrix [n t1 t2; t1 t2 t3; t2 t3 t4] by its adjugate.
   const double a00 = t2 * t4 - t3 * t3;
   const double a01 = t2 * t3 - t1 * t4;

@@ -1,16 +1,15 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <vector>
-
-#include <Eigen/Core>
 
 #include "tunnel_pilot/geometry/pose.h"
 
 namespace tunnel_pilot::perception {
 
-/// Least-squares parabolas  p(t) = a + b t + c t^2  through stretches of a polyline, t being the arc length
-/// from a place on it. Prefix sums of the moments make each fit O(1).
+/// Least-squares parabolas  p(t) = a + b t + c t^2  through stretches of a polyline, t being the arc
+/// length from a place on it. Prefix sums of the moments make each fit O(1).
 class ArcLengthFit {
  public:
   struct Parabola {
@@ -25,7 +24,10 @@ class ArcLengthFit {
     }
   };
 
-  void clear() { sums_.assign(1, {}); s_.clear(); }
+  void clear() {
+    sums_.assign(1, {});
+    s_.clear();
+  }
   void add(const geometry::Point& point);
 
   std::size_t size() const { return s_.size(); }

@@ -12,9 +12,9 @@ using geometry::PathPoint;
 using geometry::Point;
 using geometry::Pose;
 
-constexpr double kSeenComing = 2.5;     // [m] along the tunnel, between a width expected and met
-constexpr double kPathBehind = 1.5;     // [m] of the path's begin behind the reference point
-constexpr double kCurveStep = 0.5;  // [m] between samples of the walls' curves
+constexpr double kSeenComing = 2.5;      // [m] along the tunnel, between a width expected and met
+constexpr double kPathBehind = 1.5;      // [m] of the path's begin behind the reference point
+constexpr double kCurveStep = 0.5;       // [m] between samples of the walls' curves
 constexpr std::size_t kFewestInFit = 4;  // nodes in a parabola's window
 
 bool isFinite(const Pose& pose) {
@@ -146,10 +146,9 @@ void CenterlineEstimator::travel(const Walls& walls, const std::optional<Pose>& 
 }
 
 TunnelReason CenterlineEstimator::checkSingle(const Walls& walls, bool has_odometry) const {
-  const bool too_long = has_odometry
-                            ? single_distance_ > parameters_.single_distance_max
-                            : !paired_stamp_ || toSeconds(walls.stamp - *paired_stamp_) >
-                                                    parameters_.single_time_max;
+  const bool too_long = has_odometry ? single_distance_ > parameters_.single_distance_max
+                                     : !paired_stamp_ || toSeconds(walls.stamp - *paired_stamp_) >
+                                                             parameters_.single_time_max;
   return too_long ? TunnelReason::kSingleTooLong : TunnelReason::kNone;
 }
 
@@ -164,10 +163,12 @@ TunnelReason CenterlineEstimator::checkWidth(const std::optional<Pose>& pose) {
   if (pose && !memory_.empty()) {
     const Point place = pose->transform(measured_.front().position);
     for (const Node& node : memory_) {
-      if ((node.position - place).squaredNorm() < kSeenComing * kSeenComing) jump = std::min(jump, std::abs(width - node.width));
+      if ((node.position - place).squaredNorm() < kSeenComing * kSeenComing)
+        jump = std::min(jump, std::abs(width - node.width));
     }
   }
-  if (jump > parameters_.width_jump_max && ++jumps_ < parameters_.jump_scans) return TunnelReason::kWidthJump;
+  if (jump > parameters_.width_jump_max && ++jumps_ < parameters_.jump_scans)
+    return TunnelReason::kWidthJump;
   if (jumps_ >= parameters_.jump_scans) memory_.clear();
   jumps_ = 0;
   if (paired_now_) last_width_ = width;
@@ -209,7 +210,7 @@ bool CenterlineEstimator::fuse() {
       if (t <= 1.0 || j + 2 >= measured_.size()) break;
       ++j;
     }
-    if (t > 1.0) break;  // beyond what is seen now
+    if (t > 1.0) break;               // beyond what is seen now
     if (t < 0.0 && j == 0) continue;  // behind what is seen now
     const Node& a = measured_[j];
     const Node& b = measured_[j + 1];
@@ -279,8 +280,8 @@ void CenterlineEstimator::fitPath() {
     const auto [first, last] = fitWindow(i);
     const ArcLengthFit::Parabola parabola = fit_->fit(first, last, fit_->s(i));
     const Point& place = parabola.place;
-    const double s = path_.empty() ? 0.0
-                                   : path_.back().s + (place - Point(path_.back().x, path_.back().y)).norm();
+    const double s =
+        path_.empty() ? 0.0 : path_.back().s + (place - Point(path_.back().x, path_.back().y)).norm();
     path_.push_back({s, place.x(), place.y(), std::atan2(parabola.tangent.y(), parabola.tangent.x()),
                      parabola.curvature()});
   }
@@ -338,7 +339,8 @@ void CenterlineEstimator::fillState(const Walls& walls) {
 // Of the fit about node `at`, the nearest to the reference point, taken at that point's foot.
 void CenterlineEstimator::fillCovariance(const Walls& walls, std::size_t at) {
   const auto [first, last] = fitWindow(at);
-  const Point forward = (nodes_[std::min(at + 1, last)].position - nodes_[at > 0 ? at - 1 : at].position).normalized();
+  const Point forward =
+      (nodes_[std::min(at + 1, last)].position - nodes_[at > 0 ? at - 1 : at].position).normalized();
   const double foot = fit_->s(at) - nodes_[at].position.dot(forward);
   const ArcLengthFit::Parabola parabola = fit_->fit(first, last, foot);
   const double count = static_cast<double>(last - first + 1);
@@ -350,10 +352,22 @@ void CenterlineEstimator::fillCovariance(const Walls& walls, std::size_t at) {
   const Eigen::Matrix3d c = variance * parabola.inverse_normal;
   // (offset, heading error, curvature) = (-a, -b, 2 c); the width is the mean of as many pairs.
   const double w = 4.0 * variance / count;
-  tunnel_.state.covariance = {c(0, 0),        c(0, 1),        -2.0 * c(0, 2), 0.0,  //
-                      c(1, 0),        c(1, 1),        -2.0 * c(1, 2), 0.0,  //
-                      -2.0 * c(2, 0), -2.0 * c(2, 1), 4.0 * c(2, 2),  0.0,  //
-                      0.0,            0.0,            0.0,            w};
+  tunnel_.state.covariance = {c(0, 0),
+                              c(0, 1),
+                              -2.0 * c(0, 2),
+                              0.0,  //
+                              c(1, 0),
+                              c(1, 1),
+                              -2.0 * c(1, 2),
+                              0.0,  //
+                              -2.0 * c(2, 0),
+                              -2.0 * c(2, 1),
+                              4.0 * c(2, 2),
+                              0.0,  //
+                              0.0,
+                              0.0,
+                              0.0,
+                              w};
 }
 
 }  // namespace tunnel_pilot::perception

@@ -13,7 +13,8 @@ constexpr float kInsidePenalty = 0.5F;  // of a vote, for each return between th
 constexpr float kFewestVotes = 4.0F;    // for a heap to be a wall
 
 float gridValue(int i, int count, double largest) {
-  return static_cast<float>(largest) * (2.0F * static_cast<float>(i) / static_cast<float>(count - 1) - 1.0F);
+  return static_cast<float>(largest) *
+         (2.0F * static_cast<float>(i) / static_cast<float>(count - 1) - 1.0F);
 }
 
 }  // namespace
@@ -95,7 +96,8 @@ std::optional<CorridorSeed> CorridorSeeder::find(const std::vector<PointGroup>& 
     const float heading = gridValue(i, kHeadings, parameters_.seed_heading_max);
     for (int j = 0; j < kCurvatures; ++j) {
       float votes = 0.0F;
-      const CorridorSeed seed = judge(heading, gridValue(j, kCurvatures, parameters_.seed_curvature_max), votes);
+      const CorridorSeed seed =
+          judge(heading, gridValue(j, kCurvatures, parameters_.seed_curvature_max), votes);
       if (votes <= best_votes || (!seed.left && !seed.right)) continue;
       best_votes = votes;
       best = seed;

@@ -10,24 +10,26 @@ namespace tunnel_pilot::perception {
 
 /// First guess of the tunnel beside the origin.
 struct CorridorSeed {
-  double heading = 0.0;    ///< of the tunnel [rad]
-  double curvature = 0.0;  ///< of the arc through the origin [1/m]
+  double heading = 0.0;         ///< of the tunnel [rad]
+  double curvature = 0.0;       ///< of the arc through the origin [1/m]
   std::optional<double> left;   ///< lateral place of the left wall, positive [m]
   std::optional<double> right;  ///< lateral place of the right wall, negative [m]
 };
 
 /// Votes of near groups over heading and curvature. Along the arc of curvature k through the origin with
 /// heading phi, a point (u, v) in the arc's frame has the lateral offset
-///     d = (1 - sqrt((1 - k v)^2 + (k u)^2)) / k = 2 F / (1 + sqrt(1 - 2 k F)),  F = v - k (u^2 + v^2) / 2,
+///     d = (1 - sqrt((1 - k v)^2 + (k u)^2)) / k = 2 F / (1 + sqrt(1 - 2 k F)),  F = v - k (u^2 + v^2) /
+///     2,
 /// and returns of a wall along the arc heap up at one d. The hypothesis with the highest two heaps, left
 /// and right of the origin, wins.
 class CorridorSeeder {
  public:
   explicit CorridorSeeder(const WallSegmentationParameters& parameters);
   std::optional<CorridorSeed> find(const std::vector<PointGroup>& groups);
-  /// Walls left and right along the arc through `frame`, from the groups within `length` [m] ahead of it.
-  CorridorSeed findAlong(const std::vector<PointGroup>& groups, const SliceFrame& frame, double curvature,
-                         double length);
+  /// Walls left and right along the arc through `frame`, from the groups within `length` [m] ahead of
+  /// it.
+  CorridorSeed findAlong(const std::vector<PointGroup>& groups, const SliceFrame& frame,
+                         double curvature, double length);
 
  private:
   static constexpr int kBins = 64;  // either side
@@ -43,8 +45,8 @@ class CorridorSeeder {
   double offsetOf(const Heap& heap, double side) const;
 
   const WallSegmentationParameters& parameters_;
-  float bin_;                      // [m]
-  std::vector<float> x_, y_;       // near groups
+  float bin_;                 // [m]
+  std::vector<float> x_, y_;  // near groups
   float left_[kBins + 2]{};
   float right_[kBins + 2]{};
 };

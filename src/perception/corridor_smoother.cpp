@@ -1,8 +1,7 @@
 #include "corridor_smoother.h"
 
-#include <algorithm>
-
 #include <Eigen/LU>
+#include <algorithm>
 
 namespace tunnel_pilot::perception {
 namespace {

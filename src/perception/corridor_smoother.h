@@ -1,16 +1,15 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cmath>
 #include <vector>
-
-#include <Eigen/Core>
 
 #include "tunnel_pilot/geometry/pose.h"
 
 namespace tunnel_pilot::perception {
 
-/// A direction with its cosine and sine, which small turns keep up by their series instead of calling the
-/// library: turning by 0.1 rad leaves an error below 1e-7.
+/// A direction with its cosine and sine, which small turns keep up by their series instead of calling
+/// the library: turning by 0.1 rad leaves an error below 1e-7.
 class Direction {
  public:
   Direction() = default;
@@ -54,9 +53,9 @@ struct CorridorNode {
   }
 };
 
-/// Extended Kalman filter along a tunnel with a Rauch-Tung-Striebel smoother. The error state of a node is
-/// (lateral offset e, heading psi, curvature kappa, half width h) in the node's own frame; a measurement
-/// folds it into the node at once, so that it starts from zero again.
+/// Extended Kalman filter along a tunnel with a Rauch-Tung-Striebel smoother. The error state of a node
+/// is (lateral offset e, heading psi, curvature kappa, half width h) in the node's own frame; a
+/// measurement folds it into the node at once, so that it starts from zero again.
 class CorridorSmoother {
  public:
   using Vector = Eigen::Matrix<double, 4, 1>;
@@ -93,11 +92,11 @@ class CorridorSmoother {
 
  private:
   struct Step {
-    CorridorNode node;          // filtered, later smoothed
+    CorridorNode node;  // filtered, later smoothed
     Matrix covariance;
-    CorridorNode predicted;     // before this node's measurements
+    CorridorNode predicted;  // before this node's measurements
     Matrix predicted_covariance;
-    double length;              // from the node before [m]
+    double length;  // from the node before [m]
     EIGEN_MAKE_ALIGNED_OPERATOR_NEW
   };
 

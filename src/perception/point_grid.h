@@ -29,7 +29,8 @@ class PointGrid {
  public:
   static constexpr std::size_t kMaxGroups = 32767;
 
-  /// Replaces the content, at most kMaxGroups. Groups outside the grid (far behind or far away) are left out.
+  /// Replaces the content, at most kMaxGroups. Groups outside the grid (far behind or far away) are left
+  /// out.
   void fill(const std::vector<PointGroup>& groups);
 
   /// Calls visit(group index, along, lateral) for each group whose place in `frame` lies in

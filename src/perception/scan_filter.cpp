@@ -1,12 +1,12 @@
 #include "tunnel_pilot/perception/scan_filter.h"
 
+#include <pcl/common/point_tests.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <numeric>
-
-#include <pcl/common/point_tests.h>
 
 namespace tunnel_pilot::perception {
 namespace {
@@ -119,8 +119,8 @@ ScanFilter::Rejection ScanFilter::checkGeometry(const geometry::Scan& scan,
     const double tolerance = 1e-3 * model_.angle_increment;
     const bool same = std::abs(scan.angle_min - model_.angle_min) <= tolerance &&
                       std::abs(scan.angleMax() - model_.angleMax()) <= tolerance &&
-                      scan.ranges.size() == model_.ranges.size() &&
-                      scan.range_min == model_.range_min && scan.range_max == model_.range_max;
+                      scan.ranges.size() == model_.ranges.size() && scan.range_min == model_.range_min &&
+                      scan.range_max == model_.range_max;
     if (!same) return Rejection::kGeometryChanged;
   }
   const double slack = 0.5 * scan.angle_increment;
@@ -301,20 +301,34 @@ void ScanFilter::fillGaps(std::vector<float>& ranges) const {
 std::string toString(ScanFilter::Rejection rejection) {
   using Rejection = ScanFilter::Rejection;
   switch (rejection) {
-    case Rejection::kNone: return "accepted";
-    case Rejection::kMalformed: return "angle increment or range limits make no sense";
-    case Rejection::kWrongSize: return "number of ranges does not suit the angles";
-    case Rejection::kFieldOfView: return "view does not cover 90 degrees either side";
-    case Rejection::kGeometryChanged: return "geometry differs from the first scan's";
-    case Rejection::kAllNan: return "every range is NaN";
-    case Rejection::kAllInfinite: return "every range is infinite";
-    case Rejection::kNegative: return "negative range";
-    case Rejection::kNoReturns: return "no return within the range limits";
-    case Rejection::kFuture: return "stamp lies in the future";
-    case Rejection::kTooOld: return "stamp is too old";
-    case Rejection::kRepeated: return "stamp repeats the last scan's";
-    case Rejection::kBackward: return "stamp lies before the last scan's";
-    case Rejection::kFrozen: return "ranges are frozen";
+    case Rejection::kNone:
+      return "accepted";
+    case Rejection::kMalformed:
+      return "angle increment or range limits make no sense";
+    case Rejection::kWrongSize:
+      return "number of ranges does not suit the angles";
+    case Rejection::kFieldOfView:
+      return "view does not cover 90 degrees either side";
+    case Rejection::kGeometryChanged:
+      return "geometry differs from the first scan's";
+    case Rejection::kAllNan:
+      return "every range is NaN";
+    case Rejection::kAllInfinite:
+      return "every range is infinite";
+    case Rejection::kNegative:
+      return "negative range";
+    case Rejection::kNoReturns:
+      return "no return within the range limits";
+    case Rejection::kFuture:
+      return "stamp lies in the future";
+    case Rejection::kTooOld:
+      return "stamp is too old";
+    case Rejection::kRepeated:
+      return "stamp repeats the last scan's";
+    case Rejection::kBackward:
+      return "stamp lies before the last scan's";
+    case Rejection::kFrozen:
+      return "ranges are frozen";
   }
   return "unknown rejection";
 }

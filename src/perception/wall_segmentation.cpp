@@ -17,21 +17,22 @@ namespace {
 
 using geometry::Point;
 
-constexpr std::size_t kMaxNodes = 100;      // slices across the tunnel
-constexpr double kUnseenBeforeWidening = 2.0;  // [m] without either wall before another width is looked for
-constexpr double kTaperCoverage = 0.3;    // of the slice's length
+constexpr std::size_t kMaxNodes = 100;  // slices across the tunnel
+constexpr double kUnseenBeforeWidening =
+    2.0;                                    // [m] without either wall before another width is looked for
+constexpr double kTaperCoverage = 0.3;      // of the slice's length
 constexpr double kWideningLength = 5.0;     // [m] over which it must show
 constexpr double kWideningDeviation = 0.2;  // [m] of the new walls' places
-constexpr double kCoverageMin = 0.1;          // of a slice's length
-constexpr double kHuber = 1.5;               // deviations beyond which a slice counts less
-constexpr double kCurveSpacing = 0.5;  // [m] of the fitted curves' samples
-// With so much of the near stretch seen on the better wall, the last scan's tunnel holds; with so much on
-// the worse, both walls do.
+constexpr double kCoverageMin = 0.1;        // of a slice's length
+constexpr double kHuber = 1.5;              // deviations beyond which a slice counts less
+constexpr double kCurveSpacing = 0.5;       // [m] of the fitted curves' samples
+// With so much of the near stretch seen on the better wall, the last scan's tunnel holds; with so much
+// on the worse, both walls do.
 constexpr double kTrackedSupport = 0.6;
 constexpr double kPairedSupport = 0.35;
-constexpr int kScansToRevise = 10;       // with one wall alone
+constexpr int kScansToRevise = 10;  // with one wall alone
 constexpr double kRevisionMargin = 0.05;
-constexpr double kCollapse = 0.75;       // of what the last scan saw: then the guess is revised at once
+constexpr double kCollapse = 0.75;  // of what the last scan saw: then the guess is revised at once
 constexpr double kWidthDeviationMin = 0.03;  // [m] of the last scan's half width
 constexpr double kWidthDeviationMax = 0.15;  // [m]
 constexpr Stamp kGuessAge = std::chrono::milliseconds(500);
@@ -92,18 +93,16 @@ struct WallSegmentation::Impl {
   };
 
   explicit Impl(const WallSegmentationParameters& parameters)
-      : p(parameters),
-        seeder(p),
-        smoother(square(p.curvature_walk), square(p.width_walk)) {}
+      : p(parameters), seeder(p), smoother(square(p.curvature_walk), square(p.width_walk)) {}
 
   const WallSegmentationParameters p;
   CorridorSeeder seeder;
   CorridorSmoother smoother;
   PointGrid grid;
   std::vector<PointGroup> groups;
-  std::vector<int> order;                            // finite points of the input, as indices
-  std::array<std::vector<std::int8_t>, 2> taken;     // by side and group: the node it was taken for, or -1
-  std::array<std::vector<float>, 2> seen;            // by side and node: share of the slice that shows the wall
+  std::vector<int> order;                         // finite points of the input, as indices
+  std::array<std::vector<std::int8_t>, 2> taken;  // by side and group: the node it was taken for, or -1
+  std::array<std::vector<float>, 2> seen;  // by side and node: share of the slice that shows the wall
 
   void group(const pcl::PointCloud<pcl::PointXYZ>& cloud, const std::vector<int>& indices);
   // The centerline about every kCurveSpacing, from the first node of the curves on.
@@ -113,16 +112,17 @@ struct WallSegmentation::Impl {
   std::vector<Sample> samples;
   int samples_per_node = 1;
 
-  std::optional<CorridorNode> guess;                 // where the last scan's tunnel began
+  std::optional<CorridorNode> guess;  // where the last scan's tunnel began
   Stamp guess_stamp{};
-  double guess_width_deviation = 0.0;                // of its half width [m]
-  bool guess_held = false;                           // the present walls were found with its help
-  double last_total = 0.0;                           // of the last scan that held the guess
-  int unpaired_scans = 0;                            // for which one wall alone held the guess
+  double guess_width_deviation = 0.0;  // of its half width [m]
+  bool guess_held = false;             // the present walls were found with its help
+  double last_total = 0.0;             // of the last scan that held the guess
+  int unpaired_scans = 0;              // for which one wall alone held the guess
 
   void find(Stamp stamp);
   CorridorNode startOf(const CorridorSeed& seed) const;
-  void follow(const CorridorNode& start, const CorridorSmoother::Vector& deviations, bool left, bool right);
+  void follow(const CorridorNode& start, const CorridorSmoother::Vector& deviations, bool left,
+              bool right);
   bool vote(double to_beat);
   void followSeed(const CorridorSeed& seed);
   bool followGuess(Stamp stamp);
@@ -138,7 +138,8 @@ struct WallSegmentation::Impl {
   void taper(const SliceFrame& frame, std::array<WallSlice, 2>& slices);
   void measure(std::size_t side, const WallSlice& slice);
   std::size_t firstSeen() const;
-  void finish(const pcl::PointCloud<pcl::PointXYZ>& cloud, std::size_t side, std::size_t first, Wall& wall);
+  void finish(const pcl::PointCloud<pcl::PointXYZ>& cloud, std::size_t side, std::size_t first,
+              Wall& wall);
   void collectInliers(const pcl::PointCloud<pcl::PointXYZ>& cloud, std::size_t side, Wall& wall);
   bool isWall(std::size_t side) const;
   void sampleCenterline(std::size_t first);
@@ -177,7 +178,8 @@ const Walls& WallSegmentation::segment(Stamp stamp) {
   return walls_;
 }
 
-// Walks along the returns and begins a group wherever one is farther than `spacing` from the last beginning.
+// Walks along the returns and begins a group wherever one is farther than `spacing` from the last
+// beginning.
 void WallSegmentation::Impl::group(const pcl::PointCloud<pcl::PointXYZ>& cloud,
                                    const std::vector<int>& indices) {
   const auto reach_squared = static_cast<float>(square(p.spacing));
@@ -205,9 +207,10 @@ void WallSegmentation::Impl::group(const pcl::PointCloud<pcl::PointXYZ>& cloud,
   order.resize(static_cast<std::size_t>(count));
 }
 
-// The last scan's tunnel is the best first guess: beside a parked vehicle or an opening one wall shows where
-// the other still is, and a vote would take the vehicle for it. Where the guess does not hold, or now and
-// then while it holds on to one wall, the returns vote; the guess stays unless the vote explains more.
+// The last scan's tunnel is the best first guess: beside a parked vehicle or an opening one wall shows
+// where the other still is, and a vote would take the vehicle for it. Where the guess does not hold, or
+// now and then while it holds on to one wall, the returns vote; the guess stays unless the vote explains
+// more.
 void WallSegmentation::Impl::find(Stamp stamp) {
   grid.fill(groups);
   guess_held = followGuess(stamp);
@@ -231,9 +234,9 @@ void WallSegmentation::Impl::find(Stamp stamp) {
   }
 }
 
-// Follows the walls that near returns vote for, or those that returns farther ahead vote for along the same
-// arc (beside a bay its back gets the near votes), whichever explain more. False, with the walls in any
-// state, when neither explains more than `to_beat`.
+// Follows the walls that near returns vote for, or those that returns farther ahead vote for along the
+// same arc (beside a bay its back gets the near votes), whichever explain more. False, with the walls in
+// any state, when neither explains more than `to_beat`.
 bool WallSegmentation::Impl::vote(double to_beat) {
   const std::optional<CorridorSeed> near = seeder.find(groups);
   if (!near) return false;
@@ -341,15 +344,16 @@ void WallSegmentation::Impl::clear() {
   }
 }
 
-void WallSegmentation::Impl::follow(const CorridorNode& start, const CorridorSmoother::Vector& deviations,
-                                    bool left, bool right) {
+void WallSegmentation::Impl::follow(const CorridorNode& start,
+                                    const CorridorSmoother::Vector& deviations, bool left, bool right) {
   clear();
   smoother.start(start, deviations);
   const std::array<bool, 2> followed = {left, right};
-  const std::size_t nodes = std::min(static_cast<std::size_t>((p.lookahead + p.look_behind) / p.step), kMaxNodes);
+  const std::size_t nodes =
+      std::min(static_cast<std::size_t>((p.lookahead + p.look_behind) / p.step), kMaxNodes);
   const auto widen_after = static_cast<std::size_t>(std::ceil(kUnseenBeforeWidening / p.step));
-  std::size_t unseen = 0;        // slices without either wall, at the end
-  std::size_t widened_at = 0;    // node at which a change of width was looked for last
+  std::size_t unseen = 0;      // slices without either wall, at the end
+  std::size_t widened_at = 0;  // node at which a change of width was looked for last
   while (smoother.size() <= nodes) {
     const bool any = measureSlice(followed);
     unseen = any ? 0 : unseen + 1;
@@ -367,8 +371,8 @@ void WallSegmentation::Impl::follow(const CorridorNode& start, const CorridorSmo
   smoother.smooth();
 }
 
-// Where both walls are lost at once, the tunnel may go on wider or narrower along the same line. If it does,
-// goes back to the first slice without them and takes the new width from there.
+// Where both walls are lost at once, the tunnel may go on wider or narrower along the same line. If it
+// does, goes back to the first slice without them and takes the new width from there.
 bool WallSegmentation::Impl::widen(std::size_t node) {
   const CorridorNode& at = smoother.node(node);
   const CorridorSeed walls = seeder.findAlong(groups, frameOf(at), at.curvature, kWideningLength);
@@ -459,8 +463,8 @@ void WallSegmentation::Impl::taper(const SliceFrame& frame, std::array<WallSlice
 }
 
 void WallSegmentation::Impl::measure(std::size_t side, const WallSlice& slice) {
-  // Half a wall and half something before it make an outlier: the farther off, the less it counts (Huber).
-  // The face of something that juts out of the wall is short along it, and so counts little.
+  // Half a wall and half something before it make an outlier: the farther off, the less it counts
+  // (Huber). The face of something that juts out of the wall is short along it, and so counts little.
   const double miss = std::abs(kSides[side] * slice.mean.lateral - smoother.last().half_width);
   const double doubt = std::max(1.0, miss / (kHuber * deviationOf(side)));
   smoother.measure(kSides[side], slice.mean, doubt / slice.coverage * square(p.wall_deviation));
@@ -523,8 +527,8 @@ void WallSegmentation::Impl::sampleCenterline(std::size_t first) {
   }
 }
 
-void WallSegmentation::Impl::collectInliers(const pcl::PointCloud<pcl::PointXYZ>& cloud, std::size_t side,
-                                            Wall& wall) {
+void WallSegmentation::Impl::collectInliers(const pcl::PointCloud<pcl::PointXYZ>& cloud,
+                                            std::size_t side, Wall& wall) {
   struct Line {
     SliceFrame frame;
     float offset, half_bend;
@@ -550,7 +554,8 @@ void WallSegmentation::Impl::collectInliers(const pcl::PointCloud<pcl::PointXYZ>
       const float dx = point.x - n.frame.x;
       const float dy = point.y - n.frame.y;
       const float along = n.frame.cosine * dx + n.frame.sine * dy;
-      const float miss = n.frame.cosine * dy - n.frame.sine * dx - n.offset - n.half_bend * along * along;
+      const float miss =
+          n.frame.cosine * dy - n.frame.sine * dx - n.offset - n.half_bend * along * along;
       const bool on_wall = std::abs(miss) <= reach;
       wall.indices[count] = index;
       count += on_wall ? 1 : 0;

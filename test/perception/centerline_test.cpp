@@ -1,9 +1,9 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
-
-#include <Eigen/Eigenvalues>
-#include <gtest/gtest.h>
 
 #include "drive.h"
 
@@ -18,14 +18,16 @@ CenterlineParameters parameters() {
 }
 
 // Walls as they would be measured from `base` in a straight tunnel along the map's x axis.
-Walls straightWalls(const Pose& base, Stamp stamp, double width = 5.0, bool left = true, bool right = true) {
+Walls straightWalls(const Pose& base, Stamp stamp, double width = 5.0, bool left = true,
+                    bool right = true) {
   Walls walls;
   walls.stamp = stamp;
   walls.enough_returns = true;
   const auto draw = [&](Wall& wall, double y) {
     wall.found = true;
     wall.residual = 0.04;
-    for (double x = 1.5; x <= 18.0; x += 0.5) wall.curve.push_back(base.inverseTransform({base.x + x, y}));
+    for (double x = 1.5; x <= 18.0; x += 0.5)
+      wall.curve.push_back(base.inverseTransform({base.x + x, y}));
   };
   if (left) draw(walls.left, 0.5 * width);
   if (right) draw(walls.right, -0.5 * width);
@@ -105,7 +107,8 @@ TEST(Centerline, WithoutOdometryOneWallIsFollowedForATime) {
   CenterlineEstimator estimator(parameters());
   estimator.update(straightWalls({}, fromSeconds(1.0)), std::nullopt);
   const auto at = [&](double time) {
-    return estimator.update(straightWalls({}, fromSeconds(time), 5.0, false, true), std::nullopt).state.reason;
+    return estimator.update(straightWalls({}, fromSeconds(time), 5.0, false, true), std::nullopt)
+        .state.reason;
   };
   EXPECT_EQ(at(1.0 + parameters().single_time_max - 0.01), TunnelReason::kNone);
   EXPECT_EQ(at(1.0 + parameters().single_time_max + 0.01), TunnelReason::kSingleTooLong);
@@ -183,7 +186,8 @@ TEST(Centerline, ResetForgetsThatBothWallsWereSeen) {
   EXPECT_EQ(estimator.update(walls, Pose{}).state.reason, TunnelReason::kNeverPaired);
 }
 
-// --- against the world's truth -----------------------------------------------------------------------------------
+// --- against the world's truth
+// -----------------------------------------------------------------------------------
 
 struct Errors {
   std::vector<double> heading, offset, width, ahead;  // [rad, m, m, m]

@@ -15,7 +15,9 @@ std::string config(const std::string& variant, const std::string& stage) {
 
 }  // namespace
 
-std::string shippedFile(const std::string& name) { return std::string(TUNNEL_PILOT_SOURCE_DIR) + "/" + name; }
+std::string shippedFile(const std::string& name) {
+  return std::string(TUNNEL_PILOT_SOURCE_DIR) + "/" + name;
+}
 
 TestLidar::TestLidar(const std::vector<world::WallChain>& walls, std::uint64_t seed)
     : caster_(walls, kBeams), random_(seed) {
@@ -43,7 +45,8 @@ TestChain::TestChain(const std::string& variant)
       segmentation(loadWallSegmentation(config::loadFile(config(variant, "wall_segmentation")))),
       centerline(loadCenterline(config::loadFile(config(variant, "centerline")))) {}
 
-const Tunnel& TestChain::update(const geometry::Scan& scan, const std::optional<geometry::Pose>& odom_pose,
+const Tunnel& TestChain::update(const geometry::Scan& scan,
+                                const std::optional<geometry::Pose>& odom_pose,
                                 const geometry::Pose& lidar) {
   filtered = &filter.filter(scan, lidar, scan.stamp);
   segmentation.setInputCloud(filtered->points);

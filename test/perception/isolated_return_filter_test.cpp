@@ -1,8 +1,8 @@
 #include "tunnel_pilot/perception/isolated_return_filter.h"
 
-#include <limits>
-
 #include <gtest/gtest.h>
+
+#include <limits>
 
 namespace tunnel_pilot::perception {
 namespace {
@@ -10,7 +10,8 @@ namespace {
 using Cloud = pcl::PointCloud<pcl::PointXYZI>;
 using Filter = IsolatedReturnFilter<pcl::PointXYZI>;
 
-// Points 0.05 m apart on a wall, but for number 5, which hangs before it, and number 8, which is not finite.
+// Points 0.05 m apart on a wall, but for number 5, which hangs before it, and number 8, which is not
+// finite.
 Cloud::Ptr wallWithDust() {
   const Cloud::Ptr cloud(new Cloud);
   for (int i = 0; i < 12; ++i) {

@@ -1,11 +1,11 @@
 #include "tunnel_pilot/perception/scan_filter.h"
 
+#include <gtest/gtest.h>
+
 #include <cmath>
 #include <limits>
 #include <random>
 #include <vector>
-
-#include <gtest/gtest.h>
 
 namespace tunnel_pilot::perception {
 namespace {
@@ -18,7 +18,9 @@ constexpr float kInf = std::numeric_limits<float>::infinity();
 const geometry::Pose kLidar{1.6, 0.0, 0.0};
 const std::string kConfig = std::string(TUNNEL_PILOT_SOURCE_DIR) + "/config/";
 
-ScanFilterParameters parameters() { return loadScanFilter(config::loadFile(kConfig + "scan_filter.yaml")); }
+ScanFilterParameters parameters() {
+  return loadScanFilter(config::loadFile(kConfig + "scan_filter.yaml"));
+}
 
 // Scan between two straight walls 2.5 m away, as the lidar of `first` .. `last` degrees sees it.
 geometry::Scan corridorScan(double first = -95.0, double last = 95.0, double increment = 0.25) {
@@ -67,7 +69,6 @@ TEST(ScanFilter, AcceptsTheTrucksScanUnchanged) {
   EXPECT_EQ(filter.accepted(), 1U);
   EXPECT_EQ(filter.rejected(), 0U);
 }
-
 
 TEST(ScanFilter, PointsAreInBaseLinkAndBeamOrder) {
   ScanFilter filter(parameters());
@@ -282,7 +283,7 @@ TEST(ScanFilter, ValidFractionIsToldPerSector) {
   for (float& r : scan.ranges) r = std::min(r, 30.0F);
   for (std::size_t i = 0; i < 760; ++i) {
     const double degrees = -95.0 + 0.25 * static_cast<double>(i);
-    if (degrees > 30.0) scan.ranges[i] = kNan;                        // nothing on the left
+    if (degrees > 30.0) scan.ranges[i] = kNan;                          // nothing on the left
     if (std::abs(degrees) <= 30.0 && i % 8 < 4) scan.ranges[i] = kNan;  // half of the front
   }
   const std::array<double, 3> fraction = filter.filter(scan, kLidar, scan.stamp).valid_fraction;
@@ -350,8 +351,8 @@ TEST(ScanFilter, RandomScansNeverThrowNorLeakBadRanges) {
   std::uint64_t calls = 0;
   for (int round = 0; round < 3000; ++round) {
     if (unit(random) < 0.7) filter.reset();
-    geometry::Scan scan = corridorScan(-90.0 - 50.0 * unit(random), 90.0 + 50.0 * unit(random),
-                                       0.25 + unit(random));
+    geometry::Scan scan =
+        corridorScan(-90.0 - 50.0 * unit(random), 90.0 + 50.0 * unit(random), 0.25 + unit(random));
     const double share = unit(random) * unit(random);
     for (float& r : scan.ranges) {
       if (unit(random) < share) r = odd[random() % (unit(random) < 0.9 ? 7 : odd.size())];

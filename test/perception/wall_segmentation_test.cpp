@@ -1,8 +1,8 @@
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
-
-#include <gtest/gtest.h>
 
 #include "drive.h"
 
@@ -143,10 +143,18 @@ class Disturbed : public ::testing::TestWithParam<int> {
       walls[0] = left;
     };
     switch (which) {
-      case 0: walls.push_back(box({22.0, 2.05, 0.0}, 5.0, 0.8)); return {"parked vehicle", walls};
-      case 1: walls.push_back(box({18.0, -1.2, 0.3}, 0.4, 0.4)); return {"person", walls};
-      case 2: openLeft({{20.0, 2.5}, {20.0, 4.5}, {26.0, 4.5}, {26.0, 2.5}}); return {"side bay", walls};
-      case 3: openLeft({{20.0, 2.5}, {20.0, 30.0}, {25.0, 30.0}, {25.0, 2.5}}); return {"junction", walls};
+      case 0:
+        walls.push_back(box({22.0, 2.05, 0.0}, 5.0, 0.8));
+        return {"parked vehicle", walls};
+      case 1:
+        walls.push_back(box({18.0, -1.2, 0.3}, 0.4, 0.4));
+        return {"person", walls};
+      case 2:
+        openLeft({{20.0, 2.5}, {20.0, 4.5}, {26.0, 4.5}, {26.0, 2.5}});
+        return {"side bay", walls};
+      case 3:
+        openLeft({{20.0, 2.5}, {20.0, 30.0}, {25.0, 30.0}, {25.0, 2.5}});
+        return {"junction", walls};
       default:
         openLeft({{20.0, 2.5}, {20.0, 30.0}, {25.0, 30.0}, {25.0, 2.5}});
         walls[1] = {{0.0, -2.5}, {20.0, -2.5}, {20.0, -30.0}, {25.0, -30.0}, {25.0, -2.5}, {80.0, -2.5}};

@@ -14,22 +14,22 @@ namespace tunnel_pilot::perception {
 class ArcLengthFit;
 
 struct CenterlineParameters {
-  double width_min = 0.0;           ///< narrower is no tunnel [m]
-  double width_max = 0.0;           ///< wider is no tunnel [m]
-  double length_min = 0.0;          ///< a centerline measured over less is none [m]
-  double residual_max = 0.0;        ///< walls that fit worse are none [m]
-  double pair_length_min = 0.0;     ///< walls seen beside each other over less are no pair [m]
-  double single_distance_max = 0.0; ///< one wall is followed so far after both were seen [m]
-  double single_time_max = 0.0;     ///< or, where there is no odometry, so long [s]
-  double width_jump_max = 0.0;      ///< larger changes of width that were not seen coming are faults [m]
-  int jump_scans = 0;               ///< a width that lasts this many scans is believed again [1]
-  double memory_weight_max = 0.0;   ///< past scans count at most as much as this many [1]
-  double memory_behind = 0.0;       ///< past centerline kept behind the reference point [m]
-  double memory_error_max = 0.0;    ///< past centerlines farther off than this are forgotten [m]
-  double far_distance = 0.0;        ///< measured centerline counts half at about this distance ahead [m]
-  double fit_reach = 0.0;           ///< heading and curvature are fitted over +- this length [m]
-  double wall_deviation = 0.0;      ///< smallest deviation of a wall from its curve [m]
-  double wall_correlation = 0.0;    ///< correlation length of that deviation [m]
+  double width_min = 0.0;            ///< narrower is no tunnel [m]
+  double width_max = 0.0;            ///< wider is no tunnel [m]
+  double length_min = 0.0;           ///< a centerline measured over less is none [m]
+  double residual_max = 0.0;         ///< walls that fit worse are none [m]
+  double pair_length_min = 0.0;      ///< walls seen beside each other over less are no pair [m]
+  double single_distance_max = 0.0;  ///< one wall is followed so far after both were seen [m]
+  double single_time_max = 0.0;      ///< or, where there is no odometry, so long [s]
+  double width_jump_max = 0.0;     ///< larger changes of width that were not seen coming are faults [m]
+  int jump_scans = 0;              ///< a width that lasts this many scans is believed again [1]
+  double memory_weight_max = 0.0;  ///< past scans count at most as much as this many [1]
+  double memory_behind = 0.0;      ///< past centerline kept behind the reference point [m]
+  double memory_error_max = 0.0;   ///< past centerlines farther off than this are forgotten [m]
+  double far_distance = 0.0;       ///< measured centerline counts half at about this distance ahead [m]
+  double fit_reach = 0.0;          ///< heading and curvature are fitted over +- this length [m]
+  double wall_deviation = 0.0;     ///< smallest deviation of a wall from its curve [m]
+  double wall_correlation = 0.0;   ///< correlation length of that deviation [m]
 };
 
 /// Throws config::ConfigError.
@@ -37,11 +37,11 @@ CenterlineParameters loadCenterline(config::Node node);
 
 /// Makes the tunnel's state and centerline of two walls, and of one for a while.
 ///
-/// Pairs of curve samples give the centerline's points and the width; where one wall is missing the other
-/// is followed at the last width. With odometry the centerline is kept as a chain of nodes in the odom
-/// frame, each averaged over the scans that saw it (so the reference point, which lies behind what the
-/// lidar sees, gets what was measured there before); without odometry each scan stands for itself, and
-/// the centerline is prolonged backwards at constant curvature. Heading and curvature are those of a
+/// Pairs of curve samples give the centerline's points and the width; where one wall is missing the
+/// other is followed at the last width. With odometry the centerline is kept as a chain of nodes in the
+/// odom frame, each averaged over the scans that saw it (so the reference point, which lies behind what
+/// the lidar sees, gets what was measured there before); without odometry each scan stands for itself,
+/// and the centerline is prolonged backwards at constant curvature. Heading and curvature are those of a
 /// least-squares parabola over arc length,  p(t) = a + b t + c t^2  within +- fit_reach:
 ///     heading = atan2(b_y, b_x),  curvature = (b x 2 c) / |b|^3,
 /// and the covariance is the fit's, sigma^2 (A'A)^-1, times the number of samples within two correlation
@@ -88,17 +88,17 @@ class CenterlineEstimator {
 
   CenterlineParameters parameters_;
   Tunnel tunnel_;
-  std::vector<Node> measured_;   // this scan's, in base_link
-  std::vector<Node> memory_;     // in the odom frame
-  std::vector<Node> nodes_;      // what the path is made of, in base_link
+  std::vector<Node> measured_;  // this scan's, in base_link
+  std::vector<Node> memory_;    // in the odom frame
+  std::vector<Node> nodes_;     // what the path is made of, in base_link
   std::vector<geometry::PathPoint> path_;
   std::unique_ptr<ArcLengthFit> fit_;
 
   bool paired_now_ = false;
-  std::optional<double> last_width_;   // beside the truck, once both walls were seen [m]
+  std::optional<double> last_width_;  // beside the truck, once both walls were seen [m]
   std::optional<geometry::Pose> last_pose_;
   std::optional<Stamp> paired_stamp_;
-  double single_distance_ = 0.0;       // travelled since both walls were seen [m]
+  double single_distance_ = 0.0;  // travelled since both walls were seen [m]
   int jumps_ = 0;
 };
 

@@ -1,13 +1,13 @@
 #pragma once
 
+#include <pcl/common/io.h>
+#include <pcl/filters/filter_indices.h>
+#include <pcl/point_types.h>
+
 #include <cmath>
 #include <cstddef>
 #include <limits>
 #include <vector>
-
-#include <pcl/common/io.h>
-#include <pcl/filters/filter_indices.h>
-#include <pcl/point_types.h>
 
 namespace tunnel_pilot::perception {
 
@@ -18,9 +18,10 @@ namespace tunnel_pilot::perception {
 /// Neighbours in space are neighbours in the list, so no search tree is needed: a point stays when at
 /// least `min_neighbors` of the `window` points before and the `window` points after it lie nearer than
 ///     distance + slope * range,
-/// range being the point's distance from the cloud's sensor_origin_ [m]. The slope lets far points, which
-/// a scanner spaces wider, keep each other. Points that are not finite always go. The cost is O(N window);
-/// pcl::RadiusOutlierRemoval and pcl::StatisticalOutlierRemoval do the like for clouds without order.
+/// range being the point's distance from the cloud's sensor_origin_ [m]. The slope lets far points,
+/// which a scanner spaces wider, keep each other. Points that are not finite always go. The cost is O(N
+/// window); pcl::RadiusOutlierRemoval and pcl::StatisticalOutlierRemoval do the like for clouds without
+/// order.
 template <typename PointT>
 class IsolatedReturnFilter : public pcl::FilterIndices<PointT> {
  public:
@@ -31,10 +32,10 @@ class IsolatedReturnFilter : public pcl::FilterIndices<PointT> {
     this->filter_name_ = "IsolatedReturnFilter";
   }
 
-  void setWindow(int points) { window_ = points; }              ///< points before and after, at least 1
+  void setWindow(int points) { window_ = points; }               ///< points before and after, at least 1
   void setMinNeighbors(int points) { min_neighbors_ = points; }  ///< at most 2 * window
-  void setDistance(float distance) { distance_ = distance; }    ///< [m]
-  void setSlope(float slope) { slope_ = slope; }                ///< [1]
+  void setDistance(float distance) { distance_ = distance; }     ///< [m]
+  void setSlope(float slope) { slope_ = slope; }                 ///< [1]
   int getWindow() const { return window_; }
   int getMinNeighbors() const { return min_neighbors_; }
   float getDistance() const { return distance_; }
@@ -135,9 +136,9 @@ class IsolatedReturnFilter : public pcl::FilterIndices<PointT> {
   float distance_ = 0.1F;
   float slope_ = 0.05F;
   std::vector<int> neighbors_;
-  std::vector<float> x_, y_, z_;       // from the sensor [m]
-  std::vector<float> reach_squared_;   // [m^2]
-  std::vector<float> near_;            // squared distances to the k-th next [m^2]
+  std::vector<float> x_, y_, z_;      // from the sensor [m]
+  std::vector<float> reach_squared_;  // [m^2]
+  std::vector<float> near_;           // squared distances to the k-th next [m^2]
 };
 
 }  // namespace tunnel_pilot::perception

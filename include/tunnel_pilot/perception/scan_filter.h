@@ -1,13 +1,13 @@
 #pragma once
 
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
 #include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
-
-#include <pcl/point_cloud.h>
-#include <pcl/point_types.h>
 
 #include "tunnel_pilot/config/node.h"
 #include "tunnel_pilot/geometry/pose.h"
@@ -17,17 +17,17 @@
 namespace tunnel_pilot::perception {
 
 struct ScanFilterParameters {
-  double range_min = 0.0;            ///< nearer returns are none [m]; the scan's own limit counts too
-  double range_max = 0.0;            ///< farther returns are none [m]; the scan's own limit counts too
-  bool check_age = true;             ///< false for replayed recordings
-  double max_future = 0.0;           ///< a stamp farther ahead of now is refused [s]
-  double max_age = 0.0;              ///< an older stamp is refused [s]
-  int frozen_count = 0;              ///< this many identical range arrays in a row: frozen [1]
-  int isolation_window = 0;          ///< beams looked at on either side of a return [1]
-  int isolation_min_neighbors = 0;   ///< returns with fewer neighbours near them are dust [1]
-  double isolation_distance = 0.0;   ///< what near means, at range 0 [m]
-  double isolation_slope = 0.0;      ///< and how it grows with the range [1]
-  double gap_max = 0.0;              ///< widest gap filled in the network's scan [rad]
+  double range_min = 0.0;           ///< nearer returns are none [m]; the scan's own limit counts too
+  double range_max = 0.0;           ///< farther returns are none [m]; the scan's own limit counts too
+  bool check_age = true;            ///< false for replayed recordings
+  double max_future = 0.0;          ///< a stamp farther ahead of now is refused [s]
+  double max_age = 0.0;             ///< an older stamp is refused [s]
+  int frozen_count = 0;             ///< this many identical range arrays in a row: frozen [1]
+  int isolation_window = 0;         ///< beams looked at on either side of a return [1]
+  int isolation_min_neighbors = 0;  ///< returns with fewer neighbours near them are dust [1]
+  double isolation_distance = 0.0;  ///< what near means, at range 0 [m]
+  double isolation_slope = 0.0;     ///< and how it grows with the range [1]
+  double gap_max = 0.0;             ///< widest gap filled in the network's scan [rad]
 };
 
 /// Throws config::ConfigError.
@@ -37,8 +37,8 @@ ScanFilterParameters loadScanFilter(config::Node node);
 /// later stages read. Meanings are REP-117's. Nothing that is wrong with a scan throws: it is rejected,
 /// with the reason, and counted.
 ///
-/// A usable return is finite and within both the scan's and the parameters' range limits; whatever code a
-/// sensor sends for "no echo" (8.19 m, 81.9 m, 0.002 m) lies outside and is dropped.
+/// A usable return is finite and within both the scan's and the parameters' range limits; whatever code
+/// a sensor sends for "no echo" (8.19 m, 81.9 m, 0.002 m) lies outside and is dropped.
 class ScanFilter {
  public:
   enum class Rejection : std::uint8_t {
@@ -49,13 +49,13 @@ class ScanFilter {
     kGeometryChanged = 4,  ///< other angles, size or limits than the first accepted scan's
     kAllNan = 5,
     kAllInfinite = 6,
-    kNegative = 7,         ///< some range is finite and negative
-    kNoReturns = 8,        ///< no range within the limits
+    kNegative = 7,   ///< some range is finite and negative
+    kNoReturns = 8,  ///< no range within the limits
     kFuture = 9,
     kTooOld = 10,
-    kRepeated = 11,        ///< the last accepted stamp again
-    kBackward = 12,        ///< a stamp before the last accepted one
-    kFrozen = 13,          ///< the same ranges again and again
+    kRepeated = 11,  ///< the last accepted stamp again
+    kBackward = 12,  ///< a stamp before the last accepted one
+    kFrozen = 13,    ///< the same ranges again and again
   };
   static constexpr std::size_t kRejections = 14;
 
@@ -118,13 +118,13 @@ class ScanFilter {
 
   // The announced geometry and what follows from it.
   bool announced_ = false;
-  geometry::Scan model_;           // of the first accepted scan; its ranges are the last scan's
+  geometry::Scan model_;  // of the first accepted scan; its ranges are the last scan's
   geometry::Pose sensor_;
   std::vector<float> cosines_, sines_;  // of the beams, in base_link
   std::vector<std::uint8_t> sectors_;   // 0 left, 1 front, 2 right, 3 none
   std::array<int, 3> sector_sizes_{};
   std::vector<Source> sources_;
-  bool same_beams_ = false;             // the scan's beams are the network's
+  bool same_beams_ = false;  // the scan's beams are the network's
 
   std::optional<Stamp> last_stamp_;
   std::vector<float> last_ranges_;
