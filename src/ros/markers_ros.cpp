@@ -92,7 +92,7 @@ double distance(const geometry_msgs::Point32& point, const Wall& wall) {
 std_msgs::ColorRGBA clearanceColor(double clearance) {
   const double share = std::clamp((clearance - kNear) / (kFar - kNear), 0.0, 1.0);
   return color(static_cast<float>(std::min(1.0, 2.0 - 2.0 * share)),
-               static_cast<float>(std::min(1.0, 2.0 * share)), 0.15F, 0.45F);
+               static_cast<float>(std::min(1.0, 2.0 * share)), 0.15F, 0.75F);
 }
 
 // The band between both edges, as two triangles a step.
@@ -124,7 +124,9 @@ Marker stateText(const ArbiterState& state, const TruckStatus& status) {
   text.header.frame_id = kBaseFrame;
   text.scale.z = 0.9;
   text.color = kTextColor;
-  text.pose.position.z = 5.0;
+  text.pose.position.x = 3.0;  // beside the tunnel
+  text.pose.position.y = 9.0;
+  text.pose.position.z = 2.0;
   text.text =
       bridge::toString(static_cast<bridge::SafetyState>(status.state)) + ": " + state.reason_text;
   return text;

@@ -231,7 +231,7 @@ void SimulatorRos::publishTruth() {
 }
 
 void SimulatorRos::publishWalls() {
-  auto marker = lines("true_walls", 0.55F, 0.55F, 0.6F, 0.35F);
+  auto marker = lines("true_walls", 0.75F, 0.75F, 0.8F, 0.5F);
   for (const auto& chain : simulator_->world().walls) {
     addChain(chain, 0.0, marker);
     addChain(chain, kWallHeight, marker);
