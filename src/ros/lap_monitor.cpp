@@ -116,24 +116,27 @@ void LapMonitor::printProgress() const {
   std::fflush(stdout);
 }
 
+simulation::Metrics LapMonitor::metrics() const {
+  auto metrics = simulation::driveMetrics(track_, geometry::Path());
+  if (first_ && last_) metrics["lap_time"] = (last_->header.stamp - first_->header.stamp).toSec();
+  return metrics;
+}
+
 void LapMonitor::finish(const std::string& failure) {
   std::string reason = failure;
   nlohmann::json figures = nlohmann::json::object();
   if (!track_.empty()) {
-    const auto metrics = simulation::driveMetrics(track_, geometry::Path());
-    const double time = (last_->header.stamp - first_->header.stamp).toSec();
-    if (reason.empty() && metrics.at("lateral_rms") > parameters_.lateral_rms_max)
-      reason = "lateral RMS";
-    if (reason.empty() && metrics.at("lateral_max") > parameters_.lateral_max_max)
-      reason = "lateral max";
-    figures = {{"lap_time_s", rounded(time)},
-               {"lateral_mean_m", rounded(metrics.at("lateral_mean"))},
-               {"lateral_rms_m", rounded(metrics.at("lateral_rms"))},
-               {"lateral_max_m", rounded(metrics.at("lateral_max"))},
-               {"heading_mean_deg", rounded(metrics.at("heading_mean") * kDegrees)},
-               {"clearance_min_m", rounded(metrics.at("clearance_min"))},
+    const auto m = metrics();
+    if (reason.empty() && m.at("lateral_rms") > parameters_.lateral_rms_max) reason = "lateral RMS";
+    if (reason.empty() && m.at("lateral_max") > parameters_.lateral_max_max) reason = "lateral max";
+    figures = {{"lap_time_s", rounded(m.at("lap_time"))},
+               {"lateral_mean_m", rounded(m.at("lateral_mean"))},
+               {"lateral_rms_m", rounded(m.at("lateral_rms"))},
+               {"lateral_max_m", rounded(m.at("lateral_max"))},
+               {"heading_mean_deg", rounded(m.at("heading_mean") * kDegrees)},
+               {"clearance_min_m", rounded(m.at("clearance_min"))},
                {"contacts", last_->contacts - first_->contacts},
-               {"real_time_factor", rounded(time / since(engaged_at_))}};
+               {"real_time_factor", rounded(m.at("lap_time") / since(engaged_at_))}};
   }
   passed_ = reason.empty();
   if (!*passed_) figures["reason"] = reason;

@@ -40,6 +40,9 @@ class LapMonitor {
   /// The verdict, once there is one.
   std::optional<bool> passed() const { return passed_; }
 
+  /// Figures of the drive so far (simulation::driveMetrics) and its lap_time [s].
+  simulation::Metrics metrics() const;
+
  private:
   void onTruth(const SimulatorTruth& message);
   void onTruckStatus(const TruckStatus& message);

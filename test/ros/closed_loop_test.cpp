@@ -1,0 +1,66 @@
+// One lap through roslaunch: simulator, nodelets and bridge as processes, CAN frames between them. The
+// figures are those of the same lap without ROS.
+#include <gtest/gtest.h>
+#include <ros/ros.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "tunnel_pilot/ros/lap_monitor.h"
+#include "tunnel_pilot/simulation/episode.h"
+
+namespace tunnel_pilot::shell {
+namespace {
+
+// Within 20 % or 0.02 m.
+void expectAlike(double with_ros, double without, const char* what) {
+  EXPECT_NEAR(without, with_ros, std::max(0.2 * std::abs(without), 0.02)) << what;
+}
+
+// What `evaluate` tells: each figure's median over five seeds. The timing of processes makes the lap
+// with ROS a draw of its own, so a single seed's largest offset is no measure for it.
+simulation::Metrics medianLapWithoutRos() {
+  const auto scenario =
+      simulation::loadScenario(std::string(TUNNEL_PILOT_SOURCE_DIR) + "/scenarios/default_drift.yaml");
+  const auto setup = simulation::loadSetup(scenario);
+  std::map<std::string, std::vector<double>> figures;
+  for (const auto& plan : simulation::episodePlans(scenario, 5)) {
+    for (const auto& [figure, value] : simulation::runEpisode(scenario, setup, plan).metrics) {
+      figures[figure].push_back(value);
+    }
+  }
+  simulation::Metrics medians;
+  for (const auto& [figure, values] : figures) medians[figure] = simulation::quantile(values, 0.5);
+  return medians;
+}
+
+TEST(ClosedLoop, DrivesOneLapAsWellAsWithoutRos) {
+  LapMonitor monitor{ros::NodeHandle(), ros::NodeHandle("~lap_monitor")};
+  while (ros::ok() && !monitor.passed()) {
+    ros::spinOnce();
+    ros::WallDuration(0.001).sleep();
+  }
+  ASSERT_TRUE(monitor.passed().has_value());
+  EXPECT_TRUE(*monitor.passed());
+  const auto with_ros = monitor.metrics();
+  const auto without = medianLapWithoutRos();
+  ASSERT_EQ(1.0, without.at("completed"));
+  for (const char* figure : {"lateral_mean", "lateral_rms", "lateral_max", "clearance_min"}) {
+    expectAlike(with_ros.at(figure), without.at(figure), figure);
+  }
+  EXPECT_NEAR(without.at("heading_mean"), with_ros.at("heading_mean"), 0.01);  // [rad]
+  EXPECT_NEAR(without.at("lap_time"), with_ros.at("lap_time"), 0.05 * without.at("lap_time"));
+}
+
+}  // namespace
+}  // namespace tunnel_pilot::shell
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "closed_loop_test");
+  ros::NodeHandle keep_alive;
+  return RUN_ALL_TESTS();
+}
