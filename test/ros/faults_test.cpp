@@ -1,0 +1,190 @@
+// What breaks while the truck drives: every fault ends in a stop that says why, and nothing but an
+// operator's edge ends the stop.
+#include <gtest/gtest.h>
+#include <nodelet/NodeletLoad.h>
+#include <nodelet/NodeletUnload.h>
+#include <ros/ros.h>
+#include <rosgraph_msgs/Clock.h>
+#include <std_srvs/SetBool.h>
+#include <std_srvs/Trigger.h>
+#include <sys/wait.h>
+#include <tunnel_pilot/SimulatorTruth.h>
+#include <tunnel_pilot/TruckCommand.h>
+#include <tunnel_pilot/TruckStatus.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <functional>
+#include <string>
+
+#include "tunnel_pilot/supervision/command.h"
+
+namespace tunnel_pilot::shell {
+namespace {
+
+using supervision::Reason;
+
+constexpr double kStandstill = 0.02;  // [m/s]
+
+class FaultsTest : public ::testing::Test {
+ protected:
+  FaultsTest() {
+    truth_ = nh_.subscribe<SimulatorTruth>("simulator/truth", 50,
+                                           [this](const SimulatorTruth::ConstPtr& m) { truth = *m; });
+    status_ = nh_.subscribe<TruckStatus>("truck_status", 50,
+                                         [this](const TruckStatus::ConstPtr& m) { status = *m; });
+    startBridge();
+    engage();
+  }
+  ~FaultsTest() override {
+    endBridge(SIGINT);
+    // The next test begins with a truck that stands at its start.
+    spinUntil([&] { return std::abs(truth.speed) < kStandstill; });
+    call("simulator/reset");
+  }
+
+  void startBridge() {
+    bridge_ = fork();
+    if (bridge_ != 0) return;
+    const std::string program = std::string(TUNNEL_PILOT_NODE_FOLDER) + "/can_bridge";
+    execl(program.c_str(), program.c_str(), "__name:=can_bridge", nullptr);
+    _exit(127);
+  }
+
+  void endBridge(int signal) {
+    if (bridge_ <= 0) return;
+    kill(bridge_, signal);
+    waitpid(bridge_, nullptr, 0);
+    bridge_ = -1;
+  }
+
+  bool spinUntil(const std::function<bool()>& done, double seconds = 20.0) {
+    const ros::SteadyTime end = ros::SteadyTime::now() + ros::WallDuration(seconds);
+    while (ros::SteadyTime::now() < end) {
+      if (done()) return true;
+      ros::spinOnce();
+      ros::WallDuration(0.002).sleep();
+    }
+    return false;
+  }
+
+  std_srvs::Trigger::Response call(const std::string& service) {
+    std_srvs::Trigger trigger;
+    ros::service::waitForService(service, ros::Duration(-1));
+    EXPECT_TRUE(ros::service::call(service, trigger)) << service;
+    return trigger.response;
+  }
+
+  // Engages and waits until the truck drives.
+  void engage() {
+    ASSERT_TRUE(spinUntil([&] { return call("engage").success; })) << call("engage").message;
+    ASSERT_TRUE(spinUntil([&] { return truth.speed > 1.5; })) << status.reason_text;
+  }
+
+  void expectStop(Reason reason) {
+    ASSERT_TRUE(spinUntil([&] { return status.state == TruckStatus::STATE_STOPPED; }))
+        << static_cast<int>(status.state) << " " << status.reason_text;
+    EXPECT_EQ(static_cast<int>(reason), status.reason) << status.reason_text;
+    EXPECT_LT(std::abs(truth.speed), 0.2);
+    EXPECT_EQ(0u, truth.contacts);
+  }
+
+  ros::NodeHandle nh_;
+  SimulatorTruth truth;
+  TruckStatus status;
+
+ private:
+  pid_t bridge_ = -1;
+  ros::Subscriber truth_, status_;
+};
+
+TEST_F(FaultsTest, KilledBridgeStopsTheTruckByTheTrucksOwnTimeout) {
+  endBridge(SIGKILL);
+  EXPECT_TRUE(spinUntil([&] { return std::abs(truth.speed) < kStandstill; }));
+  EXPECT_EQ(0u, truth.contacts);
+  startBridge();  // a bridge that comes back does not drive on by itself
+  ASSERT_TRUE(spinUntil([&] { return status.state == TruckStatus::STATE_STANDBY; }));
+  EXPECT_LT(std::abs(truth.speed), kStandstill);
+}
+
+TEST_F(FaultsTest, SilentScanFilterStopsTheTruck) {
+  nodelet::NodeletUnload unload;
+  unload.request.name = "/scan_filter";
+  ASSERT_TRUE(ros::service::call("pilot_manager/unload_nodelet", unload));
+  const bool stopped = spinUntil([&] { return status.state == TruckStatus::STATE_STOPPED; });
+  nodelet::NodeletLoad load;
+  load.request.name = "/scan_filter";
+  load.request.type = "tunnel_pilot/scan_filter";
+  ASSERT_TRUE(ros::service::call("pilot_manager/load_nodelet", load));
+  EXPECT_TRUE(stopped);
+  EXPECT_LT(std::abs(truth.speed), 0.2);
+  EXPECT_FALSE(status.reason_text.empty());
+}
+
+TEST_F(FaultsTest, ClockThatJumpsBackStopsTheTruck) {
+  ros::Publisher clock = nh_.advertise<rosgraph_msgs::Clock>("/clock", 10);
+  ASSERT_TRUE(spinUntil([&] { return clock.getNumSubscribers() > 3; }));
+  rosgraph_msgs::Clock message;
+  message.clock = ros::Time::now() - ros::Duration(1.0);
+  clock.publish(message);
+  expectStop(Reason::kClockJump);
+}
+
+TEST_F(FaultsTest, OperatorsStopIsLatchedUntilReset) {
+  EXPECT_TRUE(call("stop").success);
+  expectStop(Reason::kOperatorStop);
+  const auto refused = call("engage");
+  EXPECT_FALSE(refused.success);
+  EXPECT_FALSE(refused.message.empty());
+  EXPECT_TRUE(spinUntil([&] { return call("reset").success; }));
+  engage();
+}
+
+TEST_F(FaultsTest, CommandsFromASecondPublisherThatAreNotFiniteDoNotReachTheTruck) {
+  ros::Publisher rogue = nh_.advertise<TruckCommand>("command", 10);
+  ASSERT_TRUE(spinUntil([&] { return rogue.getNumSubscribers() > 0; }));
+  TruckCommand command;
+  command.header.stamp = ros::Time::now();
+  command.sequence = 4'000'000'000u;
+  command.articulation_angle = std::numeric_limits<double>::quiet_NaN();
+  command.speed = 5.0;
+  for (int i = 0; i < 50; ++i) {
+    rogue.publish(command);
+    spinUntil([] { return false; }, 0.005);
+    EXPECT_TRUE(std::isfinite(truth.articulation));
+    EXPECT_LT(std::abs(truth.speed), 3.2);
+  }
+  EXPECT_EQ(0u, truth.contacts);
+}
+
+TEST_F(FaultsTest, PausedSimulatorStandsStillAndGoesOnWithoutAStop) {
+  std_srvs::SetBool pause;
+  pause.request.data = true;
+  ASSERT_TRUE(ros::service::call("simulator/pause", pause));
+  spinUntil([] { return false; }, 0.1);  // what was under way
+  const ros::Time time = truth.header.stamp;
+  spinUntil([] { return false; }, 0.5);
+  EXPECT_EQ(time, truth.header.stamp);
+  pause.request.data = false;
+  ASSERT_TRUE(ros::service::call("simulator/pause", pause));
+  ASSERT_TRUE(spinUntil([&] { return truth.header.stamp > time + ros::Duration(1.0); }));
+  EXPECT_GT(truth.speed, 1.0);
+}
+
+TEST_F(FaultsTest, ResetPutsTheTruckBackToItsStart) {
+  ASSERT_TRUE(spinUntil([&] { return truth.station > 18.0; }));
+  EXPECT_TRUE(call("stop").success);
+  expectStop(Reason::kOperatorStop);
+  EXPECT_TRUE(call("simulator/reset").success);
+  EXPECT_TRUE(spinUntil([&] { return std::abs(truth.station - 14.0) < 0.5; })) << truth.station;
+}
+
+}  // namespace
+}  // namespace tunnel_pilot::shell
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "faults_test");
+  ros::NodeHandle keep_alive;
+  return RUN_ALL_TESTS();
+}
