@@ -229,13 +229,13 @@ bool CenterlineEstimator::fuse() {
 
 void CenterlineEstimator::appendMeasured() {
   constexpr double kNearest = 0.25;  // [m] between nodes
-  for (std::size_t i = 0; i < measured_.size(); ++i) {
+  for (const auto& node : measured_) {
     if (memory_.size() >= 2) {
       const Point& last = memory_.back().position;
       const Point direction = (last - memory_[memory_.size() - 2].position).normalized();
-      if (direction.dot(measured_[i].position - last) < kNearest) continue;
+      if (direction.dot(node.position - last) < kNearest) continue;
     }
-    memory_.push_back(measured_[i]);
+    memory_.push_back(node);
   }
 }
 

@@ -546,8 +546,9 @@ void WallSegmentation::Impl::collectInliers(const pcl::PointCloud<pcl::PointXYZ>
   std::size_t count = 0;
   float sum = 0.0F;
   for (std::size_t g = 0; g < groups.size(); ++g) {
-    if (node_of[g] < 0) continue;
-    const Line& n = lines[static_cast<std::size_t>(node_of[g])];
+    const int node = node_of[g];
+    if (node < 0) continue;
+    const Line& n = lines[static_cast<std::size_t>(node)];
     for (int k = groups[g].first; k < groups[g].last; ++k) {
       const int index = order[static_cast<std::size_t>(k)];
       const pcl::PointXYZ& point = cloud.points[static_cast<std::size_t>(index)];
