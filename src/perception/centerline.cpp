@@ -12,7 +12,11 @@ using geometry::PathPoint;
 using geometry::Point;
 using geometry::Pose;
 
-constexpr double kSeenComing = 2.5;      // [m] along the tunnel, between a width expected and met
+constexpr double kSeenComing = 2.5;  // [m] along the tunnel, between a width expected and met
+// Odometry that moves farther from one scan to the next has jumped.
+constexpr double kPoseJump = 1.5;        // [m]
+constexpr double kHeadingJump = 0.5;     // [rad]
+constexpr double kSameWall = 0.8;        // [m] between a wall seen and one remembered
 constexpr double kPathBehind = 1.5;      // [m] of the path's begin behind the reference point
 constexpr double kCurveStep = 0.5;       // [m] between samples of the walls' curves
 constexpr std::size_t kFewestInFit = 4;  // nodes in a parabola's window
@@ -47,6 +51,7 @@ CenterlineParameters loadCenterline(config::Node node) {
   p.memory_weight_max = node.number("memory_weight_max", "1", 0.0, 1000.0);
   p.memory_behind = node.number("memory_behind", "m", 0.0, 20.0);
   p.memory_error_max = node.number("memory_error_max", "m", 0.01, 5.0);
+  p.disbelief_scans = static_cast<int>(node.integer("disbelief_scans", "1", 1, 1000));
   p.far_distance = node.number("far_distance", "m", 0.5, 50.0);
   p.fit_reach = node.number("fit_reach", "m", 0.5, 10.0);
   p.wall_deviation = node.number("wall_deviation", "m", 0.001, 1.0);
@@ -68,6 +73,7 @@ void CenterlineEstimator::reset() {
   paired_stamp_.reset();
   single_distance_ = 0.0;
   jumps_ = 0;
+  doubts_ = 0;
 }
 
 const Tunnel& CenterlineEstimator::refuse(TunnelReason reason) {
@@ -82,7 +88,7 @@ const Tunnel& CenterlineEstimator::refuse(TunnelReason reason) {
 const Tunnel& CenterlineEstimator::update(const Walls& walls, const std::optional<Pose>& odom_pose) {
   tunnel_.state.stamp = walls.stamp;
   const std::optional<Pose> pose = odom_pose && isFinite(*odom_pose) ? odom_pose : std::nullopt;
-  TunnelReason reason = measure(walls);
+  TunnelReason reason = measure(walls, pose);
   travel(walls, pose);
   if (reason == TunnelReason::kNone && !paired_now_) reason = checkSingle(walls, pose.has_value());
   if (reason == TunnelReason::kNone) reason = checkWidth(pose);
@@ -91,11 +97,12 @@ const Tunnel& CenterlineEstimator::update(const Walls& walls, const std::optiona
     remember(*pose);
   } else {
     memory_.clear();
+    before_.clear();
     nodes_ = measured_;
   }
   fitPath();
   if (!isPlausible()) {
-    memory_.clear();
+    disbelieve();
     return refuse(TunnelReason::kPoorFit);
   }
   fillState(walls);
@@ -103,7 +110,7 @@ const Tunnel& CenterlineEstimator::update(const Walls& walls, const std::optiona
 }
 
 // Centerline nodes of this scan, in base_link.
-TunnelReason CenterlineEstimator::measure(const Walls& walls) {
+TunnelReason CenterlineEstimator::measure(const Walls& walls, const std::optional<Pose>& pose) {
   measured_.clear();
   paired_now_ = false;
   if (!walls.left.found && !walls.right.found) {
@@ -124,21 +131,53 @@ TunnelReason CenterlineEstimator::measure(const Walls& walls) {
   if (!paired_now_) measured_.clear();
   if (!paired_now_ && !last_width_) return TunnelReason::kNeverPaired;
   const bool left_longer = left.size() > right.size();
-  followWall(left_longer ? left : right, left_longer ? 1.0 : -1.0);
+  followWall(left_longer ? left : right, left_longer ? 1.0 : -1.0, pose);
   return measured_.size() < kFewestInFit ? TunnelReason::kPoorFit : TunnelReason::kNone;
 }
 
-// Continues the measured nodes along one wall, at the last width.
-void CenterlineEstimator::followWall(const std::vector<Point>& curve, double side) {
-  const double width = measured_.empty() ? *last_width_ : measured_.back().width;
+// Continues the measured nodes along one wall: where the wall is one that is remembered, at the width
+// and in the direction that were seen there with both, else at the last width and along the wall.
+void CenterlineEstimator::followWall(const std::vector<Point>& curve, double side,
+                                     const std::optional<Pose>& pose) {
+  if (measured_.size() >= curve.size()) return;
+  double width = measured_.empty() ? *last_width_ : measured_.back().width;
+  if (pose) recallWall(side, *pose);
+  const std::size_t recalled = pose ? recalled_.size() : 0;
+  const auto gap = [&](std::size_t k, const Point& p) { return (recalled_[k].place - p).squaredNorm(); };
+  std::size_t k = 0;
   for (std::size_t i = measured_.size(); i < curve.size(); ++i) {
-    const Point normal = leftOf(tangentAt(curve, i));
+    Point normal = leftOf(tangentAt(curve, i));
+    while (k + 1 < recalled && gap(k + 1, curve[i]) <= gap(k, curve[i])) ++k;
+    if (recalled > 0 && gap(k, curve[i]) < kSameWall * kSameWall) {
+      width = recalled_[k].width;
+      normal = recalled_[k].normal;
+    }
     measured_.push_back({curve[i] - 0.5 * side * width * normal, width, 0.0});
   }
 }
 
+// Where the remembered nodes have their wall, in base_link.
+void CenterlineEstimator::recallWall(double side, const Pose& pose) {
+  const double c = std::cos(pose.heading);
+  const double s = std::sin(pose.heading);
+  const auto turn = [&](const Point& d) { return Point(c * d.x() + s * d.y(), c * d.y() - s * d.x()); };
+  recalled_.clear();
+  for (std::size_t k = 0; k + 1 < memory_.size(); ++k) {
+    const Node& node = memory_[k];
+    const Point& before = memory_[k > 0 ? k - 1 : 0].position;
+    const Point normal = turn(leftOf((memory_[k + 1].position - before).normalized()));
+    const Point place = turn(node.position - pose.position());
+    recalled_.push_back({place + 0.5 * side * node.width * normal, normal, node.width});
+  }
+}
+
 void CenterlineEstimator::travel(const Walls& walls, const std::optional<Pose>& pose) {
-  if (pose && last_pose_) single_distance_ += (pose->position() - last_pose_->position()).norm();
+  if (pose && last_pose_) {
+    const double step = (pose->position() - last_pose_->position()).norm();
+    const double turn = std::abs(geometry::wrapAngle(pose->heading - last_pose_->heading));
+    if (step > kPoseJump || turn > kHeadingJump) memory_.clear();
+    single_distance_ += step;
+  }
   last_pose_ = pose;
   if (!paired_now_) return;
   single_distance_ = 0.0;
@@ -185,8 +224,15 @@ void CenterlineEstimator::remember(const Pose& pose) {
     const Point p = node.position;
     node.position = pose.position() + Point(c * p.x() - s * p.y(), s * p.x() + c * p.y());
   }
-  if (!fuse()) memory_.clear();
-  appendMeasured();
+  before_ = memory_;
+  const Fit fit = fuse();
+  if (fit == Fit::kBad) {
+    disbelieve();
+  } else {
+    if (fit == Fit::kGood) doubts_ = 0;
+    if (fit == Fit::kApart) memory_.clear();
+  }
+  if (fit != Fit::kBad || memory_.empty()) appendMeasured();
   forgetBehind(pose);
   nodes_ = memory_;
   for (Node& node : nodes_) {
@@ -195,8 +241,16 @@ void CenterlineEstimator::remember(const Pose& pose) {
   }
 }
 
-// Moves each remembered node towards the measured centerline. False when they do not fit together.
-bool CenterlineEstimator::fuse() {
+// A scan that does not fit what is remembered is left out, but not many in a row.
+void CenterlineEstimator::disbelieve() {
+  memory_ = before_;
+  if (++doubts_ < parameters_.disbelief_scans) return;
+  memory_.clear();
+  doubts_ = 0;
+}
+
+// Moves each remembered node towards the measured centerline.
+CenterlineEstimator::Fit CenterlineEstimator::fuse() {
   double error = 0.0;
   int compared = 0;
   std::size_t j = 0;
@@ -224,7 +278,8 @@ bool CenterlineEstimator::fuse() {
     node.weight = std::min(node.weight + a.weight, parameters_.memory_weight_max);
   }
   memory_.resize(kept);
-  return compared > 0 && error <= parameters_.memory_error_max * compared;
+  if (compared == 0) return Fit::kApart;
+  return error <= parameters_.memory_error_max * compared ? Fit::kGood : Fit::kBad;
 }
 
 void CenterlineEstimator::appendMeasured() {
@@ -288,20 +343,21 @@ void CenterlineEstimator::fitPath() {
   prolongBackwards();
 }
 
-// A tunnel is long enough, finite and without kinks.
-bool CenterlineEstimator::isPlausible() const {
+// A tunnel is long enough and finite. A kink, as a wall mistaken far ahead gives it, ends the path.
+bool CenterlineEstimator::isPlausible() {
   constexpr double kKink = 0.4;  // [rad] between neighbouring samples
   for (std::size_t i = 0; i < path_.size(); ++i) {
     const PathPoint& p = path_[i];
     const bool finite = std::isfinite(p.s) && std::isfinite(p.x) && std::isfinite(p.y) &&
                         std::isfinite(p.heading) && std::isfinite(p.curvature);
-    if (!finite) return false;
-    if (i == 0) continue;
-    if (!(p.s > path_[i - 1].s)) return false;
-    const double turn = p.heading - path_[i - 1].heading;
-    if (std::abs(turn) > kKink && std::abs(geometry::wrapAngle(turn)) > kKink) return false;
+    if (!finite || (i > 0 && !(p.s > path_[i - 1].s))) return false;
+    const double turn = i > 0 ? p.heading - path_[i - 1].heading : 0.0;
+    if (std::abs(turn) > kKink && std::abs(geometry::wrapAngle(turn)) > kKink) {
+      path_.resize(i);
+      break;
+    }
   }
-  return path_.back().s - path_.front().s >= parameters_.length_min;
+  return path_.size() > 1 && path_.back().s - path_.front().s >= parameters_.length_min;
 }
 
 // Back to beside the reference point, at the first sample's curvature.

@@ -82,11 +82,12 @@ void CorridorSmoother::rewind(std::size_t count) {
   steps_.back().covariance = steps_.back().predicted_covariance;
 }
 
-void CorridorSmoother::step(double shift, double half_width, double deviation) {
+void CorridorSmoother::step(double shift, double half_width, double shift_deviation,
+                            double width_deviation) {
   Step& last = steps_.back();
   fold({shift, 0.0, 0.0, half_width - last.predicted.half_width}, last.predicted);
-  last.predicted_covariance(0, 0) += deviation * deviation;
-  last.predicted_covariance(3, 3) += deviation * deviation;
+  last.predicted_covariance(0, 0) += shift_deviation * shift_deviation;
+  last.predicted_covariance(3, 3) += width_deviation * width_deviation;
   last.node = last.predicted;
   last.covariance = last.predicted_covariance;
 }

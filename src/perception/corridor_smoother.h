@@ -66,6 +66,7 @@ class CorridorSmoother {
       : curvature_noise_(curvature_noise), width_noise_(width_noise) {}
 
   void start(const CorridorNode& node, const Vector& deviations);
+  void setWidthNoise(double width_noise) { width_noise_ = width_noise; }
   /// Appends the node `length` [m] farther on.
   void advance(double length);
   /// A wall's mean place in a slice across the tunnel, in the node's frame.
@@ -77,7 +78,7 @@ class CorridorSmoother {
   /// Measures a wall of the last node; `side` +1 left, -1 right.
   void measure(double side, const Slice& slice, double variance);
   /// The tunnel changes its width at the last node: a known step, which the smoother does not spread.
-  void step(double shift, double half_width, double deviation);
+  void step(double shift, double half_width, double shift_deviation, double width_deviation);
   /// Variance with which the wall of the last node is expected [m^2].
   double expectedVariance(double side) const;
   /// Runs back over all nodes; afterwards node(i) is the smoothed one.

@@ -19,7 +19,11 @@ using geometry::Point;
 
 constexpr std::size_t kMaxNodes = 100;  // slices across the tunnel
 constexpr double kUnseenBeforeWidening =
-    2.0;                                    // [m] without either wall before another width is looked for
+    2.0;                               // [m] without either wall before another width is looked for
+constexpr double kDisplacement = 2.0;  // [m] from a lost wall's place within which it may still be
+constexpr int kDisplacedSlices = 3;
+constexpr double kLooseWidthWalk = 0.25;    // [m per sqrt(m)]
+constexpr double kLooseMargin = 0.10;       // of all slices that it must show more
 constexpr double kTaperCoverage = 0.3;      // of the slice's length
 constexpr double kWideningLength = 5.0;     // [m] over which it must show
 constexpr double kWideningDeviation = 0.2;  // [m] of the new walls' places
@@ -116,6 +120,7 @@ struct WallSegmentation::Impl {
   Stamp guess_stamp{};
   double guess_width_deviation = 0.0;  // of its half width [m]
   bool guess_held = false;             // the present walls were found with its help
+  int displaced = 0;                   // slices with one wall, and returns beside the other's place
   double last_total = 0.0;             // of the last scan that held the guess
   int unpaired_scans = 0;              // for which one wall alone held the guess
 
@@ -123,6 +128,7 @@ struct WallSegmentation::Impl {
   CorridorNode startOf(const CorridorSeed& seed) const;
   void follow(const CorridorNode& start, const CorridorSmoother::Vector& deviations, bool left,
               bool right);
+  Support followWithLooseWidth(const Support& held);
   bool vote(double to_beat);
   void followSeed(const CorridorSeed& seed);
   bool followGuess(Stamp stamp);
@@ -133,7 +139,7 @@ struct WallSegmentation::Impl {
   bool measureSlice(const std::array<bool, 2>& followed);
   double deviationOf(std::size_t side) const;
   double gateOf(std::size_t side) const;
-  WallSlice lookForWall(std::size_t side, double gate, const SliceFrame& frame);
+  WallSlice lookForWall(std::size_t side, double gate, const SliceFrame& frame, bool take = true);
   bool movedAlike(const std::array<WallSlice, 2>& slices) const;
   void taper(const SliceFrame& frame, std::array<WallSlice, 2>& slices);
   void measure(std::size_t side, const WallSlice& slice);
@@ -216,7 +222,8 @@ void WallSegmentation::Impl::find(Stamp stamp) {
   guess_held = followGuess(stamp);
   double to_beat = 0.0;
   if (guess_held) {
-    const Support held = support();
+    Support held = support();
+    if (displaced >= kDisplacedSlices) held = followWithLooseWidth(held);
     unpaired_scans = held.worse >= kPairedSupport ? 0 : unpaired_scans + 1;
     const bool collapsed = unpaired_scans > 0 && held.total < kCollapse * last_total;
     const bool revise = collapsed || (unpaired_scans > 0 && unpaired_scans % kScansToRevise == 0);
@@ -270,6 +277,19 @@ bool WallSegmentation::Impl::followGuess(Stamp stamp) {
   if (!guess || stamp < guess_stamp || stamp - guess_stamp > kGuessAge) return false;
   follow(*guess, {0.08, 0.06, 0.03, guess_width_deviation}, true, true);
   return true;
+}
+
+// Where one wall was lost though returns stand beside its place, the tunnel may have narrowed or widened
+// and the other wall have been followed alone, to its side. With a width that may change at will both
+// walls show; if they do, that is kept.
+WallSegmentation::Impl::Support WallSegmentation::Impl::followWithLooseWidth(const Support& held) {
+  smoother.setWidthNoise(square(kLooseWidthWalk));
+  follow(*guess, {0.08, 0.06, 0.03, guess_width_deviation}, true, true);
+  smoother.setWidthNoise(square(p.width_walk));
+  const Support loose = support();
+  if (loose.total > held.total + kLooseMargin) return loose;
+  follow(*guess, {0.08, 0.06, 0.03, guess_width_deviation}, true, true);
+  return held;
 }
 
 // Of the first slice that was seen, moved back along its arc to where the curves begin.
@@ -347,6 +367,7 @@ void WallSegmentation::Impl::clear() {
 void WallSegmentation::Impl::follow(const CorridorNode& start,
                                     const CorridorSmoother::Vector& deviations, bool left, bool right) {
   clear();
+  displaced = 0;
   smoother.start(start, deviations);
   const std::array<bool, 2> followed = {left, right};
   const std::size_t nodes =
@@ -381,7 +402,7 @@ bool WallSegmentation::Impl::widen(std::size_t node) {
   const double shift = 0.5 * (*walls.left + *walls.right);
   if (width < p.width_min || width > p.width_max || std::abs(shift) > p.gate_max) return false;
   smoother.rewind(node + 1);
-  smoother.step(shift, 0.5 * width, kWideningDeviation);
+  smoother.step(shift, 0.5 * width, kWideningDeviation, kWideningDeviation);
   for (std::vector<float>& slices : seen) slices.resize(node);
   return true;
 }
@@ -395,6 +416,10 @@ bool WallSegmentation::Impl::measureSlice(const std::array<bool, 2>& followed) {
   }
   const bool lost = slices[0].groups * slices[1].groups == 0;
   if (followed[0] && followed[1] && (lost || movedAlike(slices))) taper(slice_frame, slices);
+  for (std::size_t side = 0; side < 2; ++side) {
+    if (!followed[side] || slices[side].groups > 0 || slices[1 - side].groups == 0) continue;
+    displaced += lookForWall(side, kDisplacement, slice_frame, false).groups > 0 ? 1 : 0;
+  }
   for (std::size_t side = 0; side < 2; ++side) {
     const bool measured = slices[side].groups > 0;
     if (measured) measure(side, slices[side]);
@@ -411,7 +436,8 @@ double WallSegmentation::Impl::gateOf(std::size_t side) const {
   return std::clamp(3.0 * deviationOf(side), p.gate_min, p.gate_max);
 }
 
-WallSlice WallSegmentation::Impl::lookForWall(std::size_t side, double gate, const SliceFrame& frame) {
+WallSlice WallSegmentation::Impl::lookForWall(std::size_t side, double gate, const SliceFrame& frame,
+                                              bool take) {
   const CorridorNode& node = smoother.last();
   const double middle = kSides[side] * node.half_width;
   std::vector<std::int8_t>& mine = taken[side];
@@ -430,7 +456,7 @@ WallSlice WallSegmentation::Impl::lookForWall(std::size_t side, double gate, con
                     sum_along_squared += along * along;
                     sum_lateral += lateral;
                     ++count;
-                    mine[static_cast<std::size_t>(group)] = at;
+                    if (take) mine[static_cast<std::size_t>(group)] = at;
                   });
   WallSlice slice;
   if (count == 0) return slice;
@@ -458,7 +484,7 @@ void WallSegmentation::Impl::taper(const SliceFrame& frame, std::array<WallSlice
                                          lookForWall(1, p.gate_max, frame)};
   if (!movedAlike(wide)) return;
   const double change = 0.5 * (wide[0].outward + wide[1].outward);
-  smoother.step(0.0, smoother.last().half_width + change, p.wall_deviation);
+  smoother.step(0.0, smoother.last().half_width + change, 0.0, p.wall_deviation);
   slices = wide;
 }
 

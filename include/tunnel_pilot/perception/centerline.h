@@ -25,7 +25,8 @@ struct CenterlineParameters {
   int jump_scans = 0;              ///< a width that lasts this many scans is believed again [1]
   double memory_weight_max = 0.0;  ///< past scans count at most as much as this many [1]
   double memory_behind = 0.0;      ///< past centerline kept behind the reference point [m]
-  double memory_error_max = 0.0;   ///< past centerlines farther off than this are forgotten [m]
+  double memory_error_max = 0.0;   ///< a centerline farther off than this does not fit the past ones [m]
+  int disbelief_scans = 0;         ///< as many scans that do not fit in a row: the past is forgotten [1]
   double far_distance = 0.0;       ///< measured centerline counts half at about this distance ahead [m]
   double fit_reach = 0.0;          ///< heading and curvature are fitted over +- this length [m]
   double wall_deviation = 0.0;     ///< smallest deviation of a wall from its curve [m]
@@ -69,19 +70,31 @@ class CenterlineEstimator {
     double weight = 0.0;                                 // in scans
   };
 
+  enum class Fit { kGood, kBad, kApart };
+
+  // Where a remembered node has one of its walls.
+  struct RecalledWall {
+    geometry::Point place;   // [m]
+    geometry::Point normal;  // to the left
+    double width;            // [m]
+  };
+
   const Tunnel& refuse(TunnelReason reason);
-  TunnelReason measure(const Walls& walls);
-  void followWall(const std::vector<geometry::Point>& curve, double side);
+  TunnelReason measure(const Walls& walls, const std::optional<geometry::Pose>& pose);
+  void followWall(const std::vector<geometry::Point>& curve, double side,
+                  const std::optional<geometry::Pose>& pose);
+  void recallWall(double side, const geometry::Pose& pose);
   void travel(const Walls& walls, const std::optional<geometry::Pose>& pose);
   TunnelReason checkSingle(const Walls& walls, bool has_odometry) const;
   TunnelReason checkWidth(const std::optional<geometry::Pose>& pose);
   void remember(const geometry::Pose& pose);
-  bool fuse();
+  Fit fuse();
+  void disbelieve();
   void appendMeasured();
   void forgetBehind(const geometry::Pose& pose);
   std::pair<std::size_t, std::size_t> fitWindow(std::size_t i) const;
   void fitPath();
-  bool isPlausible() const;
+  bool isPlausible();
   void prolongBackwards();
   void fillState(const Walls& walls);
   void fillCovariance(const Walls& walls, std::size_t at);
@@ -90,7 +103,9 @@ class CenterlineEstimator {
   Tunnel tunnel_;
   std::vector<Node> measured_;  // this scan's, in base_link
   std::vector<Node> memory_;    // in the odom frame
-  std::vector<Node> nodes_;     // what the path is made of, in base_link
+  std::vector<Node> before_;    // the memory before this scan
+  std::vector<RecalledWall> recalled_;
+  std::vector<Node> nodes_;  // what the path is made of, in base_link
   std::vector<geometry::PathPoint> path_;
   std::unique_ptr<ArcLengthFit> fit_;
 
@@ -100,6 +115,7 @@ class CenterlineEstimator {
   std::optional<Stamp> paired_stamp_;
   double single_distance_ = 0.0;  // travelled since both walls were seen [m]
   int jumps_ = 0;
+  int doubts_ = 0;  // scans in a row that did not fit
 };
 
 }  // namespace tunnel_pilot::perception
