@@ -184,7 +184,11 @@ void Arbiter::assessTruck(Stamp now, Findings& findings) const {
   if (!truck_state_received_) return findings.stopFor(Reason::kStartUp);
   // An arbiter that comes up behind a truck already under way has not seen it engage.
   if (truck_state_.engaged && !standby_seen_) findings.stopFor(Reason::kStartUp);
-  if (truck_state_.stopping) findings.stopFor(truck_state_.reason);
+  if (truck_state_.stopping) {
+    // A truck that stops for no reason, or for one we do not know, stops all the same.
+    const bool known = gravity(truck_state_.reason) > 0;
+    findings.stopFor(known ? truck_state_.reason : Reason::kTruckFault);
+  }
   if (age(truck_state_received_, now) > parameters_.truck_state_stop_age) {
     findings.stopFor(Reason::kFeedbackStale);
   }

@@ -76,6 +76,17 @@ TEST(Arbiter, NotEngagedTheCommandStaysWithTheArticulationSoThatEngagingIsNoJump
               bench.parameters.limiter.max_articulation_rate * 0.02 + 1e-9);
 }
 
+TEST(Arbiter, ATruckThatStopsWithoutAKnownReasonIsStoppedAllTheSame) {
+  for (const auto reason : {Reason::kNone, static_cast<Reason>(250)}) {
+    ArbiterBench bench;
+    bench.drive();
+    bench.state.stopping = true;
+    bench.state.reason = reason;
+    EXPECT_TRUE(bench.cycle().command.stop);
+    EXPECT_EQ(bench.cycle().command.reason, Reason::kTruckFault);
+  }
+}
+
 TEST(Arbiter, ATruckWithoutStatesIsTakenAsEngaged) {
   ArbiterBench bench(false);
   bench.give_state = false;
