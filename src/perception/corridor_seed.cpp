@@ -11,6 +11,7 @@ constexpr int kHeadings = 13;
 constexpr int kCurvatures = 7;
 constexpr float kInsidePenalty = 0.5F;  // of a vote, for each return between the walls
 constexpr float kFewestVotes = 4.0F;    // for a heap to be a wall
+constexpr int kApart = 4;               // bins between heaps that are different walls
 
 float gridValue(int i, int count, double largest) {
   return static_cast<float>(largest) *
@@ -32,12 +33,26 @@ void CorridorSeeder::gather(float x, float y) {
   y_.push_back(y);
 }
 
-void CorridorSeeder::gatherNear(const std::vector<PointGroup>& groups) {
+void CorridorSeeder::gatherWithin(const std::vector<PointGroup>& groups, double radius) {
   x_.clear();
   y_.clear();
-  const auto radius = static_cast<float>(parameters_.seed_radius);
+  const auto limit = static_cast<float>(radius * radius);
   for (const PointGroup& g : groups) {
-    if (g.x * g.x + g.y * g.y < radius * radius) gather(g.x, g.y);
+    if (g.x * g.x + g.y * g.y < limit) gather(g.x, g.y);
+  }
+}
+
+// In the frame, those within `length` ahead of it.
+void CorridorSeeder::gatherAlong(const std::vector<PointGroup>& groups, const SliceFrame& frame,
+                                 double length) {
+  x_.clear();
+  y_.clear();
+  for (const PointGroup& g : groups) {
+    const float dx = g.x - frame.x;
+    const float dy = g.y - frame.y;
+    const float along = frame.cosine * dx + frame.sine * dy;
+    if (along < 0.0F || along > static_cast<float>(length)) continue;
+    gather(along, frame.cosine * dy - frame.sine * dx);
   }
 }
 
@@ -58,12 +73,12 @@ void CorridorSeeder::vote(float heading, float curvature) {
   }
 }
 
-CorridorSeeder::Heap CorridorSeeder::highestHeap(const float* votes) const {
+CorridorSeeder::Heap CorridorSeeder::highestHeap(const float* votes, int apart_from) const {
   Heap best;
   float inside = 0.0F;
   for (int b = 1; b <= kBins; ++b) {
     const float heap = 0.5F * votes[b - 1] + votes[b] + 0.5F * votes[b + 1] - kInsidePenalty * inside;
-    if (heap > best.votes) best = {b, heap};
+    if (heap > best.votes && std::abs(b - apart_from) >= kApart) best = {b, heap};
     inside += votes[b - 1];
   }
   return best;
@@ -88,8 +103,8 @@ CorridorSeed CorridorSeeder::judge(float heading, float curvature, float& votes)
   return seed;
 }
 
-std::optional<CorridorSeed> CorridorSeeder::find(const std::vector<PointGroup>& groups) {
-  gatherNear(groups);
+// The arc that the gathered groups vote for.
+std::optional<CorridorSeed> CorridorSeeder::bestArc() {
   float best_votes = kFewestVotes;
   std::optional<CorridorSeed> best;
   for (int i = 0; i < kHeadings; ++i) {
@@ -106,17 +121,53 @@ std::optional<CorridorSeed> CorridorSeeder::find(const std::vector<PointGroup>& 
   return best;
 }
 
+const std::vector<CorridorSeed>& CorridorSeeder::find(const std::vector<PointGroup>& groups) {
+  seeds_.clear();
+  for (const double radius : {parameters_.seed_radius, 2.0 * parameters_.seed_radius}) {
+    gatherWithin(groups, radius);
+    const std::optional<CorridorSeed> arc = bestArc();
+    if (!arc) continue;
+    add(*arc);
+    const SliceFrame origin = {0.0F, 0.0F, static_cast<float>(std::cos(arc->heading)),
+                               static_cast<float>(std::sin(arc->heading))};
+    for (const double length : {parameters_.seed_radius, parameters_.lookahead}) {
+      gatherAlong(groups, origin, length);
+      findWalls(*arc);
+    }
+  }
+  return seeds_;
+}
+
+// Pairs of the two highest heaps on either side of the arc, from the groups gathered along it.
+void CorridorSeeder::findWalls(const CorridorSeed& arc) {
+  vote(0.0F, static_cast<float>(arc.curvature));
+  const Heap left = highestHeap(left_);
+  const Heap right = highestHeap(right_);
+  for (const Heap& l : {left, highestHeap(left_, left.bin)}) {
+    for (const Heap& r : {right, highestHeap(right_, right.bin)}) {
+      if (l.votes < kFewestVotes || r.votes < kFewestVotes) continue;
+      add({arc.heading, arc.curvature, offsetOf(l, 1.0), offsetOf(r, -1.0)});
+    }
+  }
+}
+
+// Unless nearly the same is there already.
+void CorridorSeeder::add(const CorridorSeed& seed) {
+  const auto near = [this](const std::optional<double>& a, const std::optional<double>& b) {
+    return a.has_value() == b.has_value() && (!a || std::abs(*a - *b) < static_cast<double>(bin_));
+  };
+  for (const CorridorSeed& other : seeds_) {
+    if (other.heading == seed.heading && other.curvature == seed.curvature &&
+        near(other.left, seed.left) && near(other.right, seed.right)) {
+      return;
+    }
+  }
+  seeds_.push_back(seed);
+}
+
 CorridorSeed CorridorSeeder::findAlong(const std::vector<PointGroup>& groups, const SliceFrame& frame,
                                        double curvature, double length) {
-  x_.clear();
-  y_.clear();
-  for (const PointGroup& g : groups) {
-    const float dx = g.x - frame.x;
-    const float dy = g.y - frame.y;
-    const float along = frame.cosine * dx + frame.sine * dy;
-    if (along < 0.0F || along > static_cast<float>(length)) continue;
-    gather(along, frame.cosine * dy - frame.sine * dx);
-  }
+  gatherAlong(groups, frame, length);
   float votes = 0.0F;
   return judge(0.0F, static_cast<float>(curvature), votes);
 }

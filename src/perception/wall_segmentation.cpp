@@ -35,8 +35,8 @@ constexpr double kCurveSpacing = 0.5;       // [m] of the fitted curves' samples
 constexpr double kTrackedSupport = 0.6;
 constexpr double kPairedSupport = 0.35;
 constexpr int kScansToRevise = 10;  // with one wall alone
-constexpr double kRevisionMargin = 0.05;
-constexpr double kCollapse = 0.75;  // of what the last scan saw: then the guess is revised at once
+constexpr double kRevisionMargin = 0.20;
+constexpr double kSeedMargin = 0.05;         // by which a less likely seed must explain more
 constexpr double kWidthDeviationMin = 0.03;  // [m] of the last scan's half width
 constexpr double kWidthDeviationMax = 0.15;  // [m]
 constexpr Stamp kGuessAge = std::chrono::milliseconds(500);
@@ -121,7 +121,6 @@ struct WallSegmentation::Impl {
   double guess_width_deviation = 0.0;  // of its half width [m]
   bool guess_held = false;             // the present walls were found with its help
   int displaced = 0;                   // slices with one wall, and returns beside the other's place
-  double last_total = 0.0;             // of the last scan that held the guess
   int unpaired_scans = 0;              // for which one wall alone held the guess
 
   void find(Stamp stamp);
@@ -130,6 +129,8 @@ struct WallSegmentation::Impl {
               bool right);
   Support followWithLooseWidth(const Support& held);
   bool vote(double to_beat);
+  double explained() const;
+  double slicesAhead() const { return (p.lookahead + p.look_behind) / p.step; }
   void followSeed(const CorridorSeed& seed);
   bool followGuess(Stamp stamp);
   void keepGuess(Stamp stamp, const Walls& walls);
@@ -177,8 +178,6 @@ const Walls& WallSegmentation::segment(Stamp stamp) {
     impl_->finish(*input_, 0, first, walls_.left);
     impl_->finish(*input_, 1, first, walls_.right);
     impl_->keepGuess(stamp, walls_);
-  } else {
-    impl_->guess.reset();
   }
   deinitCompute();
   return walls_;
@@ -225,11 +224,9 @@ void WallSegmentation::Impl::find(Stamp stamp) {
     Support held = support();
     if (displaced >= kDisplacedSlices) held = followWithLooseWidth(held);
     unpaired_scans = held.worse >= kPairedSupport ? 0 : unpaired_scans + 1;
-    const bool collapsed = unpaired_scans > 0 && held.total < kCollapse * last_total;
-    const bool revise = collapsed || (unpaired_scans > 0 && unpaired_scans % kScansToRevise == 0);
-    last_total = held.total;
+    const bool revise = unpaired_scans > 0 && unpaired_scans % kScansToRevise == 0;
     if (held.better >= kTrackedSupport && !revise) return;
-    to_beat = held.total + kRevisionMargin;
+    to_beat = explained() + kRevisionMargin;
   }
   if (vote(to_beat)) {
     guess_held = false;
@@ -241,26 +238,34 @@ void WallSegmentation::Impl::find(Stamp stamp) {
   }
 }
 
-// Follows the walls that near returns vote for, or those that returns farther ahead vote for along the
-// same arc (beside a bay its back gets the near votes), whichever explain more. False, with the walls in
-// any state, when neither explains more than `to_beat`.
+// Follows each of the seeds and keeps the one that explains most. False, with the walls in any state,
+// when none explains more than `to_beat`.
 bool WallSegmentation::Impl::vote(double to_beat) {
-  const std::optional<CorridorSeed> near = seeder.find(groups);
-  if (!near) return false;
-  const Direction direction(near->heading);
-  const SliceFrame origin = {0.0F, 0.0F, static_cast<float>(direction.cosine()),
-                             static_cast<float>(direction.sine())};
-  CorridorSeed far = seeder.findAlong(groups, origin, near->curvature, p.lookahead);
-  far.heading = near->heading;
-  followSeed(*near);
-  const double near_total = support().total;
-  double far_total = 0.0;
-  if (far.left && far.right) {
-    followSeed(far);
-    far_total = support().total;
+  std::optional<CorridorSeed> best;
+  for (const CorridorSeed& seed : seeder.find(groups)) {
+    followSeed(seed);
+    const double score = explained();
+    if (score <= to_beat) continue;
+    to_beat = score + kSeedMargin;
+    best = seed;
   }
-  if (far_total <= near_total) followSeed(*near);
-  return std::max(near_total, far_total) > to_beat;
+  if (best) followSeed(*best);
+  return best.has_value();
+}
+
+// Share of the slices that show the walls, less that in which something stands between them (half, as it
+// can only be one wall): what stands there all along is a wall, and what was followed a bay's back.
+double WallSegmentation::Impl::explained() const {
+  int obstructed = 0;
+  for (std::size_t i = 0; i < smoother.size(); ++i) {
+    const CorridorNode& node = smoother.node(i);
+    const double inner = node.half_width - p.gate_max;
+    bool empty = true;
+    grid.visitSlice(groups, frameOf(node), 0.5 * p.step, -inner, inner,
+                    [&](int, float, float) { empty = false; });
+    obstructed += empty ? 0 : 1;
+  }
+  return support().total - 0.5 * obstructed / slicesAhead();
 }
 
 // Twice, since a seed is coarse: the second time from where the first found the tunnel to begin.
@@ -292,14 +297,11 @@ WallSegmentation::Impl::Support WallSegmentation::Impl::followWithLooseWidth(con
   return held;
 }
 
-// Of the first slice that was seen, moved back along its arc to where the curves begin.
+// Of the first slice that was seen, moved back along its arc to where the curves begin. A scan that
+// shows no wall (dust, a dip that hides them) leaves the guess to the next one, until it is too old.
 void WallSegmentation::Impl::keepGuess(Stamp stamp, const Walls& walls) {
-  const bool paired = walls.left.found && walls.right.found;
-  const bool single = walls.left.found != walls.right.found;
-  if (!paired && !(single && guess)) {
-    guess.reset();
-    return;
-  }
+  if (!walls.left.found && !walls.right.found) return;
+  if (!guess && !(walls.left.found && walls.right.found)) return;
   const std::size_t first = firstSeen();
   CorridorNode next = smoother.node(first);
   const Support seen_near = support();
@@ -316,7 +318,7 @@ void WallSegmentation::Impl::keepGuess(Stamp stamp, const Walls& walls) {
     const double deviation = std::max(std::sqrt(smoother.covariance(first)(3, 3)), 0.5 * change);
     guess_width_deviation = std::clamp(deviation, kWidthDeviationMin, kWidthDeviationMax);
   }
-  next.move(-p.step * static_cast<double>(first));
+  next.move(-p.look_behind - next.position.dot(next.direction.along()));
   guess = next;
   guess_stamp = stamp;
 }
@@ -337,9 +339,8 @@ WallSegmentation::Impl::Support WallSegmentation::Impl::support() const {
   for (const std::vector<float>& slices : seen) {
     for (const float slice : slices) total += slice;
   }
-  const double slices_ahead = 2.0 * (p.lookahead + p.look_behind) / p.step;
   return {std::max(share[0], share[1]), std::min(share[0], share[1]), share[0] >= share[1],
-          total / slices_ahead};
+          0.5 * total / slicesAhead()};
 }
 
 CorridorNode WallSegmentation::Impl::startOf(const CorridorSeed& seed) const {

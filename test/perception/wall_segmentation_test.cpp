@@ -184,6 +184,68 @@ TEST_P(Disturbed, TheCenterlineStaysWhenDrivingPast) {
 
 INSTANTIATE_TEST_SUITE_P(Sceneries, Disturbed, ::testing::Range(0, 5));
 
+// The first scan of all, with nothing known: the back of a bay beside the truck is not the wall.
+TEST(WallSegmentation, AFirstScanBesideABayFindsTheWallsThatGoOn) {
+  for (const double depth : {1.0, 2.0, 2.5}) {
+    for (double x = 18.0; x < 26.0; x += 0.5) {
+      std::vector<world::WallChain> walls = smoothWalls(kStraight, 5.0);
+      walls[0] = {{0.0, 2.5},          {20.0, 2.5}, {20.0, 2.5 + depth},
+                  {26.0, 2.5 + depth}, {26.0, 2.5}, {80.0, 2.5}};
+      TestLidar lidar(walls);
+      TestChain chain;
+      const Tunnel& tunnel = chain.update(lidar.scan({x, 0.2, 0.02}), std::nullopt);
+      ASSERT_TRUE(tunnel.state.valid) << "bay of " << depth << " m, at " << x;
+      EXPECT_NEAR(tunnel.state.width, 5.0, 0.2) << "bay of " << depth << " m, at " << x;
+      EXPECT_NEAR(tunnel.state.lateral_offset, 0.2, 0.2) << "bay of " << depth << " m, at " << x;
+    }
+  }
+}
+
+// Three scans without a wall where a new first guess would go astray: where a return bay begins to
+// widen.
+TEST(WallSegmentation, ScansThatShowNoWallLeaveTheTunnelKnown) {
+  const world::World drift = world::loadWorld(shippedFile("worlds/default_drift.yaml"));
+  for (const int returns : {0, 60}) {
+    TestLidar lidar(drift.walls);
+    TestChain chain;
+    Pose base;
+    for (double s = 250.0; s < 263.7; s += 0.1) {
+      const geometry::PathPoint at = drift.design_line.at(s);
+      base = Pose{at.x, at.y, at.heading}.compose({0.0, 0.23, 0.13});
+      chain.update(lidar.scan(base), std::nullopt);
+    }
+    const pcl::PointCloud<pcl::PointXYZ>::Ptr blind(new pcl::PointCloud<pcl::PointXYZ>);
+    for (int i = 0; i < returns; ++i) blind->push_back({-15.0F, 0.15F * static_cast<float>(i), 0.0F});
+    for (int i = 0; i < 3; ++i) {
+      chain.segmentation.setInputCloud(blind);
+      const Walls& none = chain.segmentation.segment(lidar.scan(base).stamp);
+      EXPECT_FALSE(none.left.found || none.right.found) << returns;
+    }
+    chain.update(lidar.scan(base), std::nullopt);
+    ASSERT_TRUE(chain.walls->left.found && chain.walls->right.found) << returns;
+    const Point across = chain.walls->left.curve.front() - chain.walls->right.curve.front();
+    EXPECT_NEAR(across.norm(), 5.2, 0.4) << returns;
+    EXPECT_NEAR(std::atan2(-across.x(), across.y()), -0.13, 0.1) << returns;
+  }
+}
+
+// Each scan's tunnel is the next one's first guess. As the truck weaves, that must not creep away from
+// it, though each round of offset and heading could move it by their product: walls are seen as far as
+// ever.
+TEST(WallSegmentation, WallsAreSeenAsFarAsEverHoweverLongTheTruckWeaves) {
+  for (const double turn : {1.0, -1.0}) {
+    TestLidar lidar(smoothWalls(kStraight, 5.0));
+    TestChain chain;
+    for (double phase = 0.0; phase < 250.0; phase += 0.1) {
+      const Pose base{20.0, 0.3 * turn * std::sin(phase), 0.25 * std::cos(phase)};
+      chain.update(lidar.scan(base), std::nullopt);
+      ASSERT_TRUE(chain.walls->left.found && chain.walls->right.found) << turn << " " << phase;
+      ASSERT_GT(chain.walls->left.curve.back().norm(), 15.0) << turn << " " << phase;
+      ASSERT_LT(chain.walls->left.curve.back().norm(), 21.0) << turn << " " << phase;
+    }
+  }
+}
+
 TEST(WallSegmentation, RandomCloudsNeverThrowNorGiveBadNumbers) {
   std::mt19937_64 random(5);
   std::uniform_real_distribution<float> place(-20.0F, 40.0F);
