@@ -20,7 +20,9 @@ constexpr double kNear = 0.2, kFar = 0.8;  // clearances shown red and green [m]
 constexpr double kDriftWidth = 5.0;        // sizes below are for this width [m]
 constexpr double kScaleShare = 0.02;       // of each width measured, in the scale of what is drawn
 constexpr double kWallHeight = 1.5;        // of the faces drawn on the walls [m]
+constexpr double kReplayScale = 0.5;       // largest scale of the text where nobody drives
 constexpr double kTextHeight = 0.85;       // of a line [m]
+constexpr double kTextLifetime = 5.0;      // a dead pilot's last words are not kept [s] ROS time
 constexpr double kStatusPeriod = 0.1;      // [s] steady time
 constexpr double kCorridorPeriod = 0.04;   // [s] steady time
 constexpr double kSilent = 1.0;            // what is older is not told any more [s]
@@ -168,6 +170,7 @@ Marker statusMarker(const StatusText& status, double scale) {
   header.frame_id = kBaseFrame;
   Marker text = marker(header, "status", 0, Marker::TEXT_VIEW_FACING);
   text.frame_locked = true;
+  text.lifetime = ros::Duration(kTextLifetime);
   text.scale.z = kTextHeight * scale;
   text.color = textColor(status.gravity);
   text.pose.position.x = 1.0 * scale;
@@ -272,10 +275,11 @@ void MarkersRos::publishDrivenPath() {
 
 void MarkersRos::publishStatus() {
   if (!isSeen()) return;
-  const auto status =
-      describe({truck_status_.get(kSilent), arbiter_state_.get(kSilent), command_.get(kSilent),
-                tunnel_state_.get(kSilent), odometry_.get(kSilent)});
-  const Marker text = statusMarker(status, scale_);
+  const auto arbiter = arbiter_state_.get(kSilent);
+  const auto status = describe({truck_status_.get(kSilent), arbiter, command_.get(kSilent),
+                                tunnel_state_.get(kSilent), odometry_.get(kSilent)});
+  // A recording without a truck is looked at from nearer.
+  const Marker text = statusMarker(status, arbiter ? scale_ : std::min(scale_, kReplayScale));
   MarkerArray markers;
   markers.markers.push_back(status.text.empty() ? removal(text) : text);
   publisher_.publish(markers);

@@ -24,7 +24,6 @@ class Latest {
     message_ = message;
     received_ = ros::Time::now();
   }
-  void clear() { message_.reset(); }
   /// Empty when none came within the last `max_age` [s].
   std::optional<Message> get(double max_age) const {
     if (!message_) return {};
