@@ -39,6 +39,7 @@ BridgeParameters loadBridge(config::Node node) {
   p.steering_rate = node.number("steering_rate", "rad/s", 0.01, 0.5);
   p.gyro_bias_time = node.number("gyro_bias_time", "s", 0.1, 60.0);
   p.tracking = loadTracking(node.child("tracking"));
+  p.errors = loadSensorErrors(node.child("sensor_errors"));
   node.finish();
   return p;
 }

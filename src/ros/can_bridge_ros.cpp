@@ -86,7 +86,7 @@ void CanBridgeRos::publishMotion() {
   const auto& motion = bridge_->motion();
   published_motion_ = motion.stamp;
   joint_publisher_.publish(toJointState(motion));
-  const auto odometry = toOdometry(motion);
+  const auto odometry = toRos(bridge_->odometry());
   odometry_publisher_.publish(odometry);
   geometry_msgs::TransformStamped transform;
   transform.header = odometry.header;

@@ -263,7 +263,8 @@ sensor_msgs::JointState toJointState(const drivers::Motion& motion) {
   return message;
 }
 
-nav_msgs::Odometry toOdometry(const drivers::Motion& motion) {
+nav_msgs::Odometry toRos(const bridge::Odometry& odometry) {
+  const auto& motion = odometry.motion();
   nav_msgs::Odometry message;
   message.header.stamp = toRos(motion.stamp);
   message.header.frame_id = kOdomFrame;
@@ -271,6 +272,21 @@ nav_msgs::Odometry toOdometry(const drivers::Motion& motion) {
   message.pose.pose = toRos(motion.pose);
   message.twist.twist.linear.x = motion.speed;
   message.twist.twist.angular.z = motion.yaw_rate;
+  constexpr std::size_t kMeasured[] = {0, 1, 5};  // x, y, yaw of the six rows
+  constexpr std::size_t kRows = 6;
+  constexpr double kUnknown = 1e6;
+  for (const std::size_t row : {2U, 3U, 4U}) {
+    message.pose.covariance[row * kRows + row] = kUnknown;
+    message.twist.covariance[row * kRows + row] = kUnknown;
+  }
+  const auto pose = odometry.poseCovariance();
+  const auto twist = odometry.twistVariance();
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      message.pose.covariance[kMeasured[i] * kRows + kMeasured[j]] = pose(i, j);
+    }
+    message.twist.covariance[kMeasured[i] * kRows + kMeasured[i]] = twist(i);
+  }
   return message;
 }
 

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <string>
 
-#include "tunnel_pilot/bridge/safety_state.h"
 #include "tunnel_pilot/ros/conversions.h"
 #include "tunnel_pilot/ros/parameters.h"
 
@@ -15,8 +14,18 @@ using visualization_msgs::Marker;
 using visualization_msgs::MarkerArray;
 
 constexpr double kPathSpacing = 0.2;       // of the driven path's points [m]
+constexpr double kPathJump = 5.0;          // between two messages: the odometry began anew [m]
 constexpr std::size_t kPathPoints = 3000;  // older ones are forgotten
 constexpr double kNear = 0.2, kFar = 0.8;  // clearances shown red and green [m]
+constexpr double kDriftWidth = 5.0;        // sizes below are for this width [m]
+constexpr double kScaleShare = 0.02;       // of each width measured, in the scale of what is drawn
+constexpr double kWallHeight = 1.5;        // of the faces drawn on the walls [m]
+constexpr double kReplayScale = 0.5;       // largest scale of the text where nobody drives
+constexpr double kTextHeight = 0.85;       // of a line [m]
+constexpr double kTextLifetime = 5.0;      // a dead pilot's last words are not kept [s] ROS time
+constexpr double kStatusPeriod = 0.1;      // [s] steady time
+constexpr double kCorridorPeriod = 0.04;   // [s] steady time
+constexpr double kSilent = 1.0;            // what is older is not told any more [s]
 
 std_msgs::ColorRGBA color(float r, float g, float b, float a) {
   std_msgs::ColorRGBA c;
@@ -31,7 +40,6 @@ const std_msgs::ColorRGBA kLeftColor = color(0.25F, 0.62F, 1.0F, 1.0F);
 const std_msgs::ColorRGBA kRightColor = color(1.0F, 0.55F, 0.15F, 1.0F);
 const std_msgs::ColorRGBA kPreviewColor = color(1.0F, 0.2F, 0.8F, 1.0F);
 const std_msgs::ColorRGBA kPathColor = color(0.95F, 0.95F, 0.55F, 0.9F);
-const std_msgs::ColorRGBA kTextColor = color(1.0F, 1.0F, 1.0F, 1.0F);
 
 Marker marker(const std_msgs::Header& header, const std::string& ns, int id, int type) {
   Marker m;
@@ -60,18 +68,41 @@ geometry_msgs::Point raised(const geometry_msgs::Point32& point, double height) 
   return p;
 }
 
+// A face of this height that stands on a curve; translucent, without light and shade.
+Marker face(const Marker& curve, int id, double height, float alpha) {
+  Marker m = marker(curve.header, curve.ns, id, Marker::TRIANGLE_LIST);
+  m.scale.x = m.scale.y = m.scale.z = 1.0;
+  m.color = curve.color;
+  m.color.a = alpha;
+  const auto at = [](geometry_msgs::Point point, double z) {
+    point.z = z;
+    return point;
+  };
+  for (std::size_t i = 0; i + 1 < curve.points.size(); ++i) {
+    const auto& a = curve.points[i];
+    const auto& b = curve.points[i + 1];
+    m.points.insert(m.points.end(), {at(a, 0.0), at(b, 0.0), at(b, height)});
+    m.points.insert(m.points.end(), {at(a, 0.0), at(b, height), at(a, height)});
+  }
+  m.colors.assign(m.points.size(), m.color);
+  return m;
+}
+
 void addWall(const Wall& wall, const std_msgs::Header& header, const std::string& ns,
-             const std_msgs::ColorRGBA& c, MarkerArray& markers) {
+             const std_msgs::ColorRGBA& c, double scale, MarkerArray& markers) {
+  const double height = kWallHeight * scale;
   Marker points = marker(header, ns, 0, Marker::POINTS);
-  points.scale.x = points.scale.y = 0.12;
+  points.scale.x = points.scale.y = 0.12 * scale;
   points.color = c;
-  for (const auto& point : wall.points) points.points.push_back(raised(point, 0.6));
+  for (const auto& point : wall.points) points.points.push_back(raised(point, 0.5 * height));
   Marker curve = marker(header, ns, 1, Marker::LINE_STRIP);
-  curve.scale.x = 0.14;
+  curve.scale.x = 0.10 * scale;
   curve.color = c;
-  for (const auto& point : wall.curve) curve.points.push_back(raised(point, 0.5));
+  for (const auto& point : wall.curve) curve.points.push_back(raised(point, 0.5 * height));
+  const Marker area = face(curve, 2, height, 0.45F);
   markers.markers.push_back(points.points.empty() ? removal(points) : points);
   markers.markers.push_back(curve.points.size() < 2 ? removal(curve) : curve);
+  markers.markers.push_back(area.points.empty() ? removal(area) : area);
 }
 
 // Distance of a corridor's edge point to a wall's curve, by its samples and the middles between them
@@ -119,16 +150,33 @@ Marker corridor(const ArbiterState& state, const Walls& walls) {
   return band.points.empty() ? removal(band) : band;
 }
 
-Marker stateText(const ArbiterState& state, const TruckStatus& status) {
-  Marker text = marker(state.header, "state", 0, Marker::TEXT_VIEW_FACING);
-  text.header.frame_id = kBaseFrame;
-  text.scale.z = 0.9;
-  text.color = kTextColor;
-  text.pose.position.x = 3.0;  // beside the tunnel
-  text.pose.position.y = 9.0;
-  text.pose.position.z = 2.0;
-  text.text =
-      bridge::toString(static_cast<bridge::SafetyState>(status.state)) + ": " + state.reason_text;
+std_msgs::ColorRGBA textColor(Gravity gravity) {
+  switch (gravity) {
+    case Gravity::kStandby:
+      return color(0.7F, 0.75F, 0.8F, 1.0F);
+    case Gravity::kLimited:
+      return color(1.0F, 0.8F, 0.25F, 1.0F);
+    case Gravity::kStopped:
+      return color(1.0F, 0.4F, 0.35F, 1.0F);
+    case Gravity::kNormal:
+      break;
+  }
+  return color(1.0F, 1.0F, 1.0F, 1.0F);
+}
+
+// Beside the tunnel on the left, where it hides neither the truck nor its way.
+Marker statusMarker(const StatusText& status, double scale) {
+  std_msgs::Header header;  // without a stamp: at the latest transform
+  header.frame_id = kBaseFrame;
+  Marker text = marker(header, "status", 0, Marker::TEXT_VIEW_FACING);
+  text.frame_locked = true;
+  text.lifetime = ros::Duration(kTextLifetime);
+  text.scale.z = kTextHeight * scale;
+  text.color = textColor(status.gravity);
+  text.pose.position.x = 1.0 * scale;
+  text.pose.position.y = 11.0 * scale;
+  text.pose.position.z = 2.0 * scale;
+  text.text = status.text;
   return text;
 }
 
@@ -143,32 +191,45 @@ MarkersRos::MarkersRos(ros::NodeHandle nh, ros::NodeHandle private_nh) {
   driven_path_.color = kPathColor;
   publisher_ = nh.advertise<MarkerArray>("markers", 10);
   walls_subscriber_ = nh.subscribe("walls", 1, &MarkersRos::onWalls, this);
+  tunnel_subscriber_ = nh.subscribe("tunnel_state", 1, &MarkersRos::onTunnelState, this);
   arbiter_subscriber_ = nh.subscribe("arbiter_state", 1, &MarkersRos::onArbiterState, this);
+  command_subscriber_ = nh.subscribe("command", 1, &Latest<TruckCommand>::set, &command_);
   proposal_subscriber_ = nh.subscribe("preview_driver/proposal", 1, &MarkersRos::onProposal, this);
   status_subscriber_ = nh.subscribe("truck_status", 1, &MarkersRos::onTruckStatus, this);
   odometry_subscriber_ = nh.subscribe("odom", 1, &MarkersRos::onOdometry, this);
-}
-
-void MarkersRos::publish(const MarkerArray& markers) const {
-  if (publisher_.getNumSubscribers() > 0) publisher_.publish(markers);
+  timer_ = nh.createWallTimer(ros::WallDuration(kStatusPeriod),
+                              [this](const ros::WallTimerEvent&) { publishStatus(); });
 }
 
 void MarkersRos::onWalls(const Walls& message) {
   walls_ = message;
+  if (!isSeen()) return;
   MarkerArray markers;
-  addWall(message.left, message.header, "wall_left", kLeftColor, markers);
-  addWall(message.right, message.header, "wall_right", kRightColor, markers);
-  publish(markers);
+  addWall(message.left, message.header, "wall_left", kLeftColor, scale_, markers);
+  addWall(message.right, message.header, "wall_right", kRightColor, scale_, markers);
+  publisher_.publish(markers);
+}
+
+void MarkersRos::onTunnelState(const TunnelState& message) {
+  tunnel_state_.set(message);
+  if (!message.valid || !std::isfinite(message.width)) return;
+  const double scale = std::clamp(message.width / kDriftWidth, 0.2, 1.0);
+  scale_ += (is_scaled_ ? kScaleShare : 1.0) * (scale - scale_);
+  is_scaled_ = true;
 }
 
 void MarkersRos::onArbiterState(const ArbiterState& message) {
+  arbiter_state_.set(message);
+  const auto now = ros::SteadyTime::now();
+  if (!isSeen() || (now - corridor_drawn_).toSec() < kCorridorPeriod) return;
+  corridor_drawn_ = now;
   MarkerArray markers;
   markers.markers.push_back(corridor(message, walls_));
-  markers.markers.push_back(stateText(message, truck_status_));
-  publish(markers);
+  publisher_.publish(markers);
 }
 
 void MarkersRos::onProposal(const Proposal& message) {
+  if (!isSeen()) return;
   Marker point = marker(message.header, "preview_point", 0, Marker::SPHERE);
   point.header.frame_id = kBaseFrame;
   point.scale.x = point.scale.y = point.scale.z = 0.7;
@@ -177,25 +238,51 @@ void MarkersRos::onProposal(const Proposal& message) {
   point.pose.position.z = 0.6;
   MarkerArray markers;
   markers.markers.push_back(message.has_preview_point ? point : removal(point));
-  publish(markers);
+  publisher_.publish(markers);
 }
 
-void MarkersRos::onTruckStatus(const TruckStatus& message) { truck_status_ = message; }
+void MarkersRos::onTruckStatus(const TruckStatus& message) {
+  const auto before = truck_status_.get(kSilent);
+  truck_status_.set(message);
+  if (message.state != TruckStatus::STATE_ARMED || !before || before->state == message.state) return;
+  driven_path_.points.clear();  // a new drive begins
+  publishDrivenPath();
+}
 
 void MarkersRos::onOdometry(const nav_msgs::Odometry& message) {
+  odometry_.set(message);
   auto& points = driven_path_.points;
   const auto& position = message.pose.pose.position;
-  if (message.header.stamp < driven_path_.header.stamp) points.clear();  // the clock jumped back
-  const bool moved = points.empty() || std::hypot(position.x - points.back().x,
-                                                  position.y - points.back().y) > kPathSpacing;
-  if (!moved) return;
+  if (!std::isfinite(position.x + position.y)) return;
+  const double way =
+      points.empty() ? 0.0 : std::hypot(position.x - points.back().x, position.y - points.back().y);
+  if (message.header.stamp < driven_path_.header.stamp || way > kPathJump) points.clear();
+  if (!points.empty() && way < kPathSpacing) return;
   if (points.size() >= kPathPoints) points.erase(points.begin(), points.begin() + kPathPoints / 10);
   points.push_back(position);
   points.back().z = 0.1;
   driven_path_.header.stamp = message.header.stamp;
+  publishDrivenPath();
+}
+
+void MarkersRos::publishDrivenPath() {
+  if (!isSeen()) return;
   MarkerArray markers;
-  markers.markers.push_back(points.size() < 2 ? removal(driven_path_) : driven_path_);
-  publish(markers);
+  driven_path_.scale.x = 0.12 * scale_;
+  markers.markers.push_back(driven_path_.points.size() < 2 ? removal(driven_path_) : driven_path_);
+  publisher_.publish(markers);
+}
+
+void MarkersRos::publishStatus() {
+  if (!isSeen()) return;
+  const auto arbiter = arbiter_state_.get(kSilent);
+  const auto status = describe({truck_status_.get(kSilent), arbiter, command_.get(kSilent),
+                                tunnel_state_.get(kSilent), odometry_.get(kSilent)});
+  // A recording without a truck is looked at from nearer.
+  const Marker text = statusMarker(status, arbiter ? scale_ : std::min(scale_, kReplayScale));
+  MarkerArray markers;
+  markers.markers.push_back(status.text.empty() ? removal(text) : text);
+  publisher_.publish(markers);
 }
 
 }  // namespace tunnel_pilot::shell

@@ -3,8 +3,9 @@
 #include <ros/console.h>
 #include <rosgraph_msgs/Clock.h>
 #include <tunnel_pilot/SimulatorTruth.h>
-#include <visualization_msgs/Marker.h>
+#include <visualization_msgs/MarkerArray.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tunnel_pilot/can/embedded_bus.h"
@@ -18,37 +19,79 @@ namespace {
 
 constexpr Stamp kClockPeriod = std::chrono::milliseconds(10);
 constexpr Stamp kFramePeriod = std::chrono::milliseconds(20);
-constexpr Stamp kObstaclePeriod = std::chrono::milliseconds(200);
-constexpr double kLongestWait = 0.25;  // [s] steady time
-constexpr double kWallHeight = 1.5;    // of the pictured walls [m]
+constexpr Stamp kObstaclePeriod = std::chrono::milliseconds(50);
+constexpr double kLongestWait = 0.25;    // [s] steady time
+constexpr double kWallHeight = 1.5;      // of the pictured walls [m]
+constexpr double kObstacleHeight = 1.7;  // of the pictured obstacles [m]
 
 // True when the step from `before` to `now` reached another multiple of the period.
 bool isDue(Stamp before, Stamp now, Stamp period) { return before / period != now / period; }
 
-visualization_msgs::Marker lines(const std::string& ns, float red, float green, float blue,
-                                 float alpha) {
-  visualization_msgs::Marker marker;
-  marker.header.frame_id = kMapFrame;
-  marker.ns = ns;
-  marker.type = visualization_msgs::Marker::LINE_LIST;
-  marker.pose.orientation.w = 1.0;
-  marker.scale.x = 0.06;
-  marker.color.r = red;
-  marker.color.g = green;
-  marker.color.b = blue;
-  marker.color.a = alpha;
-  return marker;
+using visualization_msgs::Marker;
+using visualization_msgs::MarkerArray;
+
+Marker marker(const std::string& ns, int id, int type, float red, float green, float blue, float alpha) {
+  Marker m;
+  m.header.frame_id = kMapFrame;
+  m.ns = ns;
+  m.id = id;
+  m.type = type;
+  m.pose.orientation.w = 1.0;
+  m.scale.x = m.scale.y = m.scale.z = 1.0;
+  m.color.r = red;
+  m.color.g = green;
+  m.color.b = blue;
+  m.color.a = alpha;
+  return m;
 }
 
-void addChain(const world::WallChain& chain, double height, visualization_msgs::Marker& marker) {
+geometry_msgs::Point raised(const geometry::Point& point, double height) {
+  geometry_msgs::Point p;
+  p.x = point.x();
+  p.y = point.y();
+  p.z = height;
+  return p;
+}
+
+// A triangle of one colour: the marker's own, darkened by `light` (0..1).
+void addTriangle(const geometry_msgs::Point& a, const geometry_msgs::Point& b,
+                 const geometry_msgs::Point& c, double light, Marker& triangles) {
+  auto color = triangles.color;
+  const auto factor = static_cast<float>(light);
+  color.r *= factor;
+  color.g *= factor;
+  color.b *= factor;
+  triangles.points.insert(triangles.points.end(), {a, b, c});
+  triangles.colors.insert(triangles.colors.end(), 3, color);
+}
+
+// Upright faces on the chain, darker the more they look sideways.
+void addFaces(const world::WallChain& chain, double height, Marker& triangles) {
   for (std::size_t i = 0; i + 1 < chain.size(); ++i) {
-    for (const auto& point : {chain[i], chain[i + 1]}) {
-      geometry_msgs::Point p;
-      p.x = point.x();
-      p.y = point.y();
-      p.z = height;
-      marker.points.push_back(p);
-    }
+    const auto along = chain[i + 1] - chain[i];
+    const double light = 0.6 + 0.25 * std::abs(along.y()) / std::max(along.norm(), 1e-9);
+    const auto a = raised(chain[i], 0.0), b = raised(chain[i + 1], 0.0);
+    const auto c = raised(chain[i + 1], height), d = raised(chain[i], height);
+    addTriangle(a, b, c, light, triangles);
+    addTriangle(a, c, d, light, triangles);
+  }
+}
+
+// A closed outline's lid, as a fan about its middle.
+void addLid(const world::WallChain& chain, double height, Marker& triangles) {
+  if (chain.empty()) return;
+  geometry::Point sum = geometry::Point::Zero();
+  for (const auto& point : chain) sum += point;
+  const geometry_msgs::Point middle = raised(sum / static_cast<double>(chain.size()), height);
+  for (std::size_t i = 0; i + 1 < chain.size(); ++i) {
+    addTriangle(raised(chain[i], height), raised(chain[i + 1], height), middle, 1.0, triangles);
+  }
+}
+
+void addEdges(const world::WallChain& chain, double height, Marker& lines) {
+  for (std::size_t i = 0; i + 1 < chain.size(); ++i) {
+    lines.points.push_back(raised(chain[i], height));
+    lines.points.push_back(raised(chain[i + 1], height));
   }
 }
 
@@ -98,6 +141,7 @@ SimulatorRos::SimulatorRos(ros::NodeHandle nh, ros::NodeHandle private_nh) {
   configure(private_nh);
   advertise(nh, private_nh);
   publishWalls();
+  publishObstacles();
 }
 
 void SimulatorRos::configure(const ros::NodeHandle& private_nh) {
@@ -132,8 +176,8 @@ void SimulatorRos::advertise(ros::NodeHandle& nh, ros::NodeHandle& private_nh) {
   clock_publisher_ = nh.advertise<rosgraph_msgs::Clock>("/clock", 10);
   scan_publisher_ = nh.advertise<sensor_msgs::LaserScan>("scan", 2);
   truth_publisher_ = private_nh.advertise<SimulatorTruth>("truth", 50);
-  walls_publisher_ = private_nh.advertise<visualization_msgs::Marker>("walls", 1, true);
-  obstacles_publisher_ = private_nh.advertise<visualization_msgs::Marker>("obstacles", 1);
+  walls_publisher_ = private_nh.advertise<MarkerArray>("walls", 1, true);
+  obstacles_publisher_ = private_nh.advertise<MarkerArray>("obstacles", 1, true);
   const auto hints = ros::TransportHints().tcpNoDelay();
   command_subscriber_ = nh.subscribe<TruckCommand>(
       "command", 10,
@@ -165,7 +209,7 @@ void SimulatorRos::advance() {
     awaitCommand(events.scan->stamp);
   }
   if (isDue(before, now, kFramePeriod)) awaitBridge();
-  if (isDue(before, now, kObstaclePeriod)) publishObstacles();
+  if (isDue(before, now, kObstaclePeriod) && !simulator_->world().obstacles.empty()) publishObstacles();
   if (!clock_due) return;
   const bool lockstep = command_lockstep_.alive && bridge_lockstep_.alive;
   pace_.hold(now,
@@ -231,22 +275,36 @@ void SimulatorRos::publishTruth() {
 }
 
 void SimulatorRos::publishWalls() {
-  auto marker = lines("true_walls", 0.75F, 0.75F, 0.8F, 0.5F);
+  auto faces = marker("true_walls", 0, Marker::TRIANGLE_LIST, 0.75F, 0.75F, 0.8F, 0.22F);
+  auto edges = marker("true_walls", 1, Marker::LINE_LIST, 0.75F, 0.75F, 0.8F, 0.5F);
+  edges.scale.x = 0.06;
   for (const auto& chain : simulator_->world().walls) {
-    addChain(chain, 0.0, marker);
-    addChain(chain, kWallHeight, marker);
+    addFaces(chain, kWallHeight, faces);
+    addEdges(chain, 0.0, edges);
+    addEdges(chain, kWallHeight, edges);
   }
-  walls_publisher_.publish(marker);
+  MarkerArray markers;
+  if (!edges.points.empty()) markers.markers = {faces, edges};
+  walls_publisher_.publish(markers);
 }
 
 void SimulatorRos::publishObstacles() {
-  const auto& obstacles = simulator_->world().obstacles;
-  if (obstacles.empty() || obstacles_publisher_.getNumSubscribers() == 0) return;
-  auto marker = lines("obstacles", 0.9F, 0.3F, 0.3F, 0.8F);
-  for (const auto& obstacle : obstacles) {
-    addChain(obstacle.chainAt(toSeconds(simulator_->now())), kWallHeight, marker);
+  MarkerArray markers;
+  int id = 0;
+  for (const auto& obstacle : simulator_->world().obstacles) {
+    const auto outline = obstacle.chainAt(toSeconds(simulator_->now()));
+    auto body = marker("obstacles", id, Marker::TRIANGLE_LIST, 0.95F, 0.3F, 0.25F, 1.0F);
+    addFaces(outline, kObstacleHeight, body);
+    addLid(outline, kObstacleHeight, body);
+    auto name = marker("obstacle_names", id++, Marker::TEXT_VIEW_FACING, 1.0F, 0.75F, 0.7F, 1.0F);
+    const auto pose = obstacle.poseAt(toSeconds(simulator_->now()));
+    name.pose.position = raised(geometry::Point(pose.x, pose.y), kObstacleHeight + 0.6);
+    name.scale.z = 0.7;
+    name.text = obstacle.name;
+    if (!body.points.empty()) markers.markers.push_back(body);
+    if (!name.text.empty()) markers.markers.push_back(name);
   }
-  obstacles_publisher_.publish(marker);
+  obstacles_publisher_.publish(markers);
 }
 
 // What a localisation would tell: where odom lies in the map, by the true pose at the odometry's stamp.

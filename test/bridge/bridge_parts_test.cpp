@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <cmath>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -53,7 +55,7 @@ TEST(BridgeParameters, EveryKeyIsNeededAndOfTheRightKind) {
     }
     ++keys;
   }
-  EXPECT_EQ(keys, 20);
+  EXPECT_EQ(keys, 21);
   YAML::Node unknown = YAML::Clone(good);
   unknown["typo"] = 1;
   EXPECT_TRUE(refused(unknown, "typo"));
@@ -61,10 +63,12 @@ TEST(BridgeParameters, EveryKeyIsNeededAndOfTheRightKind) {
 
 // -------- odometry
 
+constexpr SensorErrors kErrors = {0.005, 0.01, 0.0, 0.05 * kDeg, 0.05 * kDeg, 0.00002, 0.3 * kDeg};
+
 TEST(Odometry, FollowsTheTruckThroughAnS) {
   vehicle::KinematicTruck plant(truck());
   plant.reset(geometry::Pose(), 0.0, 3.0);
-  Odometry odometry(truck().geometry, 2.0, 0.05);
+  Odometry odometry(truck().geometry, 2.0, 0.05, kErrors);
   for (int i = 0; i <= 40000; ++i) {  // 40 s, 120 m
     const vehicle::PlantState& state = plant.state();
     if (i % 20 == 0) {
@@ -82,7 +86,7 @@ TEST(Odometry, HoldsItsWayWithTheSensorsErrors) {
   // driving.
   vehicle::KinematicTruck plant(truck());
   plant.reset(geometry::Pose(), 0.0, 0.0);
-  Odometry odometry(truck().geometry, 2.0, 0.05);
+  Odometry odometry(truck().geometry, 2.0, 0.05, kErrors);
   double way = 0.0;
   for (int i = 0; i <= 35000; ++i) {
     const vehicle::PlantState& state = plant.state();
@@ -101,25 +105,71 @@ TEST(Odometry, HoldsItsWayWithTheSensorsErrors) {
 }
 
 TEST(Odometry, DoesNotLearnTheBiasWhileDriving) {
-  Odometry odometry(truck().geometry, 2.0, 0.05);
+  Odometry odometry(truck().geometry, 2.0, 0.05, kErrors);
   for (int i = 0; i < 500; ++i) odometry.update(0.1, 0.0, 3.0, 0.3, ms(20 * i));
   EXPECT_EQ(odometry.gyroBias(), 0.0);
 }
 
 TEST(Odometry, UsesKinematicsWithoutAGyro) {
-  Odometry odometry(truck().geometry, 2.0, 0.05);
+  Odometry odometry(truck().geometry, 2.0, 0.05, kErrors);
   odometry.update(12.0 * kDeg, 0.0, 3.0, std::nullopt, ms(0));
   EXPECT_NEAR(odometry.motion().yaw_rate, 7.05 * kDeg, 0.02 * kDeg);  // SPECIFICATION 1.0
 }
 
 TEST(Odometry, IntegratesNothingAcrossAClockThatJumped) {
-  Odometry odometry(truck().geometry, 2.0, 0.05);
+  Odometry odometry(truck().geometry, 2.0, 0.05, kErrors);
   odometry.update(0.0, 0.0, 3.0, 0.0, ms(100000));
   odometry.forgetTime();
   odometry.update(0.0, 0.0, 3.0, 0.0, ms(0));
   EXPECT_EQ(odometry.motion().pose.x, 0.0);
   odometry.update(0.0, 0.0, 3.0, 0.0, ms(20));
   EXPECT_NEAR(odometry.motion().pose.x, 0.06, 1e-12);
+}
+
+// Many trucks with errors drawn from the deviations that the odometry is told: squared errors over their
+// covariance (x, y, heading) must be three on average.
+TEST(Odometry, KnowsHowFarOffItMayBe) {
+  constexpr int kTrucks = 200;
+  std::mt19937 engine(1);
+  std::normal_distribution<double> normal;
+  double sum = 0.0;
+  for (int truck_number = 0; truck_number < kTrucks; ++truck_number) {
+    const double scale = 1.0 + kErrors.speed_scale * normal(engine);
+    double bias = kErrors.gyro_bias * normal(engine);
+    Odometry odometry(truck().geometry, 2.0, 0.05, kErrors);
+    geometry::Pose pose;
+    for (int i = 0; i <= 2000; ++i) {  // 5 s at rest, then 35 s: an S of 100 m
+      const auto speed = [](int at) { return at < 250 ? 0.0 : 3.0; };
+      const auto yaw_rate = [](int at) { return at < 250 ? 0.0 : 0.25 * std::sin(0.004 * at); };
+      if (i > 0) {
+        const double turn = 0.01 * (yaw_rate(i - 1) + yaw_rate(i));
+        const double way = 0.01 * (speed(i - 1) + speed(i));
+        pose.x += way * std::cos(pose.heading + 0.5 * turn);
+        pose.y += way * std::sin(pose.heading + 0.5 * turn);
+        pose.heading += turn;
+      }
+      bias += std::sqrt(0.02) * kErrors.gyro_drift * normal(engine);
+      odometry.update(0.0, 0.0, scale * speed(i) + kErrors.speed * normal(engine),
+                      yaw_rate(i) + bias + kErrors.yaw_rate * normal(engine), ms(20 * i));
+    }
+    const auto& measured = odometry.motion().pose;
+    const Eigen::Vector3d error(measured.x - pose.x, measured.y - pose.y,
+                                geometry::wrapAngle(measured.heading - pose.heading));
+    sum += error.dot(odometry.poseCovariance().ldlt().solve(error));
+  }
+  EXPECT_NEAR(sum / kTrucks, 3.0, 1.0);
+}
+
+TEST(Odometry, IsLessSureWithoutAGyro) {
+  Odometry with(truck().geometry, 2.0, 0.05, kErrors), without(truck().geometry, 2.0, 0.05, kErrors);
+  for (int i = 0; i <= 1000; ++i) {
+    with.update(0.0, 0.0, 3.0, 0.0, ms(20 * i));
+    without.update(0.0, 0.0, 3.0, std::nullopt, ms(20 * i));
+  }
+  EXPECT_GT(without.poseCovariance()(2, 2), with.poseCovariance()(2, 2));
+  EXPECT_GT(without.twistVariance()(2), with.twistVariance()(2));
+  // 0.3 deg at the hinge are 0.18 deg/s at 3 m/s: 3.5 deg in 20 s.
+  EXPECT_NEAR(std::sqrt(without.poseCovariance()(2, 2)), 3.5 * kDeg, 0.1 * kDeg);
 }
 
 // -------- steering response

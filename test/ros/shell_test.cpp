@@ -11,6 +11,7 @@
 #include "tunnel_pilot/ros/motion_input.h"
 #include "tunnel_pilot/ros/parameters.h"
 #include "tunnel_pilot/ros/sensor_pose.h"
+#include "tunnel_pilot/ros/status_text.h"
 
 namespace tunnel_pilot::shell {
 namespace {
@@ -285,6 +286,91 @@ TEST(BusTap, CountsBeforeFramesAreReadAndLosesNone) {
   EXPECT_EQ(0x110u, tap.receive()->id);
   EXPECT_EQ(0x111u, tap.receive()->id);
   EXPECT_FALSE(tap.receive().has_value());
+}
+
+bool tells(const StatusText& status, const std::string& words) {
+  return status.text.find(words) != std::string::npos;
+}
+
+StatusInput drivingStatus() {
+  StatusInput input;
+  input.truck.emplace();
+  input.truck->state = TruckStatus::STATE_ACTIVE;
+  input.truck->reason_text = "driving as asked";
+  input.arbiter.emplace();
+  input.arbiter->source = TruckCommand::SOURCE_PREVIEW_DRIVER;
+  input.arbiter->reason_text = "driving as asked";
+  input.arbiter->limited_by = "sight";
+  input.arbiter->free_distance = 12.5;
+  input.command.emplace();
+  input.command->mode = TruckCommand::MODE_AUTONOMOUS;
+  input.command->speed = 2.5;
+  input.odometry.emplace();
+  input.odometry->twist.twist.linear.x = 2.25;
+  return input;
+}
+
+TEST(StatusText, TellsHowTheTruckDrives) {
+  const auto status = describe(drivingStatus());
+  EXPECT_EQ(Gravity::kNormal, status.gravity);
+  for (const auto* words : {"ACTIVE, autonomous", "driving as asked", "steered by: preview driver",
+                            "2.25 m/s of 2.50, limit: sight", "free: 12.5 m"}) {
+    EXPECT_TRUE(tells(status, words)) << words << " is not in\n" << status.text;
+  }
+}
+
+TEST(StatusText, TellsWhyTheBridgeStoppedTheTruck) {
+  auto input = drivingStatus();
+  input.truck->state = TruckStatus::STATE_STOPPED;
+  input.truck->reason_text = "no lidar scan";
+  const auto status = describe(input);
+  EXPECT_EQ(Gravity::kStopped, status.gravity);
+  EXPECT_TRUE(tells(status, "no lidar scan"));
+  EXPECT_FALSE(tells(status, "driving as asked"));
+}
+
+TEST(StatusText, TellsWhyTheTruckIsNotReady) {
+  auto input = drivingStatus();
+  input.truck->state = TruckStatus::STATE_STANDBY;
+  input.arbiter->stop = true;
+  input.arbiter->reason_text = "no valid tunnel";
+  const auto status = describe(input);
+  EXPECT_EQ(Gravity::kStandby, status.gravity);
+  EXPECT_TRUE(tells(status, "no valid tunnel"));
+}
+
+TEST(StatusText, TellsOfTheTunnelWhereThereIsNoPilot) {
+  StatusInput input;
+  input.tunnel.emplace();
+  input.tunnel->reason = TunnelState::REASON_NO_WALLS;
+  EXPECT_TRUE(tells(describe(input), "no tunnel: "));
+  EXPECT_EQ(Gravity::kLimited, describe(input).gravity);
+  input.tunnel->valid = true;
+  input.tunnel->width = 5.0;
+  input.tunnel->curvature = -1.0 / 25.0;
+  EXPECT_TRUE(tells(describe(input), "width 5.00 m, radius 25 m right"));
+  EXPECT_EQ(Gravity::kNormal, describe(input).gravity);
+}
+
+TEST(StatusText, IsEmptyWhereNothingIsKnown) { EXPECT_TRUE(describe({}).text.empty()); }
+
+TEST(OdometryMessage, HasTheCovarianceOfWhatIsMeasured) {
+  vehicle::TruckGeometry truck{};
+  truck.front_axle_to_hinge = 2.0;
+  truck.rear_axle_to_hinge = 3.0;
+  bridge::Odometry odometry(truck, 2.0, 0.05, {0.005, 0.01, 0.02, 0.001, 0.001, 0.0, 0.005});
+  for (int i = 0; i <= 100; ++i) odometry.update(0.0, 0.0, 3.0, 0.0, fromSeconds(0.02 * i));
+  const auto message = toRos(odometry);
+  EXPECT_NEAR(0.06, std::sqrt(message.pose.covariance[0]), 0.002) << "1 % of 6 m";
+  EXPECT_GT(message.pose.covariance[7], 0.0);
+  EXPECT_GT(message.pose.covariance[35], 0.0);
+  EXPECT_EQ(message.pose.covariance[11], message.pose.covariance[31]) << "y and yaw";
+  EXPECT_GT(message.pose.covariance[11], 0.0);
+  EXPECT_NEAR(0.03, std::sqrt(message.twist.covariance[0]), 0.001) << "1 % of 3 m/s";
+  for (const int unknown : {14, 21, 28}) {
+    EXPECT_EQ(1e6, message.pose.covariance[unknown]);
+    EXPECT_EQ(1e6, message.twist.covariance[unknown]);
+  }
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "tunnel_pilot/bridge/odometry_error.h"
 #include "tunnel_pilot/config/node.h"
 
 namespace tunnel_pilot::bridge {
@@ -36,6 +37,7 @@ struct BridgeParameters {
   double steering_rate;        ///< of the angle sent, the last limit before the bus [rad/s]
   double gyro_bias_time;       ///< time constant of the gyro's bias at standstill [s]
   TrackingParameters tracking;
+  SensorErrors errors;  ///< of what odometry is made from
 };
 
 /// Throws config::ConfigError naming file, key, unit and range.

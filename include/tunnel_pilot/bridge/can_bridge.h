@@ -82,6 +82,7 @@ class CanBridge {
   void clockJumped(Stamp now);
 
   const drivers::Motion& motion() const { return odometry_.motion(); }
+  const Odometry& odometry() const { return odometry_; }
   bool motionFresh(Stamp now) const { return link_.fresh(now); }
   const BridgeStatus& status() const { return status_; }
 

@@ -75,7 +75,9 @@ ArbiterState toArbiterState(const supervision::Decision& decision);
 drivers::Motion toMotion(const nav_msgs::Odometry& message);
 
 sensor_msgs::JointState toJointState(const drivers::Motion& motion);
-nav_msgs::Odometry toOdometry(const drivers::Motion& motion);
+
+/// With its covariance. What a truck on a plane does not measure (z, roll, pitch) has a variance of 1e6.
+nav_msgs::Odometry toRos(const bridge::Odometry& odometry);
 TruckStatus toRos(const bridge::BridgeStatus& status, Stamp stamp);
 
 /// What the arbiter needs to know of the bridge.

@@ -4,38 +4,75 @@
 #include <ros/node_handle.h>
 #include <tunnel_pilot/ArbiterState.h>
 #include <tunnel_pilot/Proposal.h>
+#include <tunnel_pilot/TruckCommand.h>
 #include <tunnel_pilot/TruckStatus.h>
+#include <tunnel_pilot/TunnelState.h>
 #include <tunnel_pilot/Walls.h>
 #include <visualization_msgs/MarkerArray.h>
 
 #include <optional>
 
+#include "tunnel_pilot/ros/status_text.h"
+
 namespace tunnel_pilot::shell {
 
+/// The latest message of a topic and when it came, by ROS time: what stands still while time does.
+template <class Message>
+class Latest {
+ public:
+  void set(const Message& message) {
+    message_ = message;
+    received_ = ros::Time::now();
+  }
+  /// Empty when none came within the last `max_age` [s].
+  std::optional<Message> get(double max_age) const {
+    if (!message_) return {};
+    const double age = (ros::Time::now() - received_).toSec();
+    return age >= 0.0 && age <= max_age ? message_ : std::nullopt;
+  }
+
+ private:
+  std::optional<Message> message_;
+  ros::Time received_;
+};
+
 /// Pictures for rviz' stock displays of what the pilot measures and intends. Subscribes `walls`,
-/// `arbiter_state`, `preview_driver/proposal`, `truck_status`, `odom`; publishes `markers`
-/// (visualization_msgs/MarkerArray) with namespaces wall_left, wall_right (returns and curves),
-/// preview_point, corridor (swept by both bodies, green where far from the walls, red where near),
-/// driven_path (in odom) and state (the safety state and its reason in words). Costs nothing while
-/// nobody looks. No parameters. Throws config::ConfigError for any that is given.
+/// `tunnel_state`, `arbiter_state`, `command`, `preview_driver/proposal`, `truck_status`, `odom`;
+/// publishes `markers` (visualization_msgs/MarkerArray) with namespaces wall_left, wall_right (returns,
+/// curves and the faces that stand on them), preview_point, corridor (swept by both bodies, green where
+/// far from the walls, red where near), driven_path (in odom, since the pilot was last engaged, the
+/// odometry jumped or the clock went back) and status (in words: status_text.h). Sizes follow the
+/// tunnel's width, so that a robot's corridor looks like a truck's drift. Costs little while nobody
+/// looks. No parameters. Throws config::ConfigError for any that is given.
 class MarkersRos {
  public:
   MarkersRos(ros::NodeHandle nh, ros::NodeHandle private_nh);
 
  private:
   void onWalls(const Walls& message);
+  void onTunnelState(const TunnelState& message);
   void onArbiterState(const ArbiterState& message);
   void onProposal(const Proposal& message);
   void onTruckStatus(const TruckStatus& message);
   void onOdometry(const nav_msgs::Odometry& message);
-  void publish(const visualization_msgs::MarkerArray& markers) const;
+  void publishStatus();
+  void publishDrivenPath();
+  bool isSeen() const { return publisher_.getNumSubscribers() > 0; }
 
   Walls walls_;
-  TruckStatus truck_status_;
+  Latest<TruckStatus> truck_status_;
+  Latest<ArbiterState> arbiter_state_;
+  Latest<TruckCommand> command_;
+  Latest<TunnelState> tunnel_state_;
+  Latest<nav_msgs::Odometry> odometry_;
+  double scale_ = 0.5;      // of what is drawn: the tunnel's width over a drift's, slowly followed
+  bool is_scaled_ = false;  // a width was seen
+  ros::SteadyTime corridor_drawn_;
   visualization_msgs::Marker driven_path_;
   ros::Publisher publisher_;
-  ros::Subscriber walls_subscriber_, arbiter_subscriber_, proposal_subscriber_, status_subscriber_,
-      odometry_subscriber_;
+  ros::Subscriber walls_subscriber_, tunnel_subscriber_, arbiter_subscriber_, command_subscriber_,
+      proposal_subscriber_, status_subscriber_, odometry_subscriber_;
+  ros::WallTimer timer_;
 };
 
 }  // namespace tunnel_pilot::shell

@@ -34,10 +34,10 @@ class Pace {
 /// frames over the embedded bus and `scan` (frame `laser`, stamped at its first beam, published after
 /// the lidar's latency), and gives frames back; nothing else passes between them. For people and judges,
 /// on topics of its own: `~truth` (tunnel_pilot/SimulatorTruth), `~walls` and
-/// `~obstacles` (visualization_msgs/Marker in map), TF map -> odom (from `odom` and the truth, as a
-/// localisation would). Services ~reset (std_srvs/Trigger: the truck back to its start, at rest; time
-/// goes on) and ~pause (std_srvs/SetBool: time stands still). Contacts of either body are logged and
-/// counted.
+/// `~obstacles` (visualization_msgs/MarkerArray in map, latched), TF map -> odom (from `odom` and the
+/// truth, as a localisation would). Services ~reset (std_srvs/Trigger: the truck back to its start, at
+/// rest; time goes on) and ~pause (std_srvs/SetBool: time stands still). Contacts of either body are
+/// logged and counted.
 ///
 /// Lockstep: after each scan time stands still until `command` carries the scan's stamp, and at each
 /// 20 ms until the bridge has sent its frame, but at most 0.25 s of steady time, which counts as a miss.

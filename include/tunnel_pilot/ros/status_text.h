@@ -1,0 +1,36 @@
+#pragma once
+
+#include <nav_msgs/Odometry.h>
+#include <tunnel_pilot/ArbiterState.h>
+#include <tunnel_pilot/TruckCommand.h>
+#include <tunnel_pilot/TruckStatus.h>
+#include <tunnel_pilot/TunnelState.h>
+
+#include <optional>
+#include <string>
+
+namespace tunnel_pilot::shell {
+
+/// How grave it is what a StatusText tells: the colour it is written in.
+enum class Gravity { kNormal, kStandby, kLimited, kStopped };
+
+struct StatusText {
+  std::string text;  ///< lines; empty when nothing is known
+  Gravity gravity = Gravity::kNormal;
+};
+
+/// What is known lately; what is silent is left empty.
+struct StatusInput {
+  std::optional<TruckStatus> truck;
+  std::optional<ArbiterState> arbiter;
+  std::optional<TruckCommand> command;
+  std::optional<TunnelState> tunnel;
+  std::optional<nav_msgs::Odometry> odometry;
+};
+
+/// What an operator wants to read beside the truck: the safety state and mode, the one reason why it
+/// does what it does, who steers, the speed and what limits it, the distance that is free and the one
+/// that a stop takes, and where the truck is in the tunnel or why that is not known.
+StatusText describe(const StatusInput& input);
+
+}  // namespace tunnel_pilot::shell
