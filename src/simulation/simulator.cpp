@@ -53,6 +53,7 @@ Simulator::Simulator(const SimulatorParameters& parameters, const TruckControlle
 
 void Simulator::place(const Pose& pose, double speed) {
   plant_->reset(pose, 0.0, speed);
+  controller_.restart();
   last_pose_ = pose;
   pending_.clear();
   sweeping_ = false;

@@ -119,6 +119,11 @@ void TruckController::enter(State state, const SensedTruck& truck) {
   state_ = state;
 }
 
+void TruckController::restart() {
+  own_faults_ = 0;
+  state_ = State::kManual;  // and ready at the next step, if the key is at autonomous
+}
+
 void TruckController::decide(const SensedTruck& truck, Stamp now) {
   const bool key = operator_.key == can::OperatorKey::kAutonomous;
   if (!key) {

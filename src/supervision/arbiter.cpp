@@ -117,6 +117,7 @@ void Arbiter::clockJumped() {
   centerline_pose_.reset();
   corridor_stamp_.reset();
   slow_until_.reset();
+  wait_until_.reset();
   last_hit_.reset();
   last_.reset();
   hits_ = 0;
@@ -367,6 +368,19 @@ void Arbiter::latch(Findings& findings, Stamp now) {
   if (latched_) findings.stop = *latched_;
 }
 
+// A truck that stands before an obstacle or at the end of sight drives on when the way has been free for
+// a while: somebody who walks to and fro before it must not tug it along step by step.
+Arbiter::Speed Arbiter::waitForFreeWay(const Speed& speed, Stamp now) {
+  const bool blocked = speed.by == SpeedLimit::kObstacle || speed.by == SpeedLimit::kSight;
+  const bool stands = !history_.empty() && std::abs(history_.latest().speed) < kStanding;
+  if (blocked && stands && speed.value < kStanding) {
+    waits_for_ = speed.by;
+    wait_until_ = now + fromSeconds(parameters_.recovery_time);
+  }
+  if (!wait_until_ || *wait_until_ <= now) return speed;
+  return {0.0, Source::kNone, waits_for_};
+}
+
 bool Arbiter::slowNow(Reason found, Stamp now) {
   if (found != Reason::kNone) {
     slow_reason_ = found;
@@ -388,7 +402,7 @@ const Decision& Arbiter::decide(Stamp now) {
   updateCorridor(steering.articulation, now);
   Findings findings = assess(now);
   latch(findings, now);
-  Speed speed = chooseSpeed(now);
+  Speed speed = waitForFreeWay(chooseSpeed(now), now);
   const bool stop = findings.stop != Reason::kNone;
   decision_.degraded = slowNow(findings.slow, now) && !stop;
   if (decision_.degraded && parameters_.degraded_speed < speed.value) {

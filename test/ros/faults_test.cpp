@@ -189,6 +189,15 @@ TEST_F(FaultsTest, ResetPutsTheTruckBackToItsStart) {
   EXPECT_TRUE(spinUntil([&] { return std::abs(truth.station - 14.0) < 0.5; })) << truth.station;
 }
 
+TEST_F(FaultsTest, AResetOnTheMoveNeedsTheOperatorBeforeTheTruckDrivesAgain) {
+  ASSERT_TRUE(spinUntil([&] { return truth.station > 18.0; }));
+  EXPECT_TRUE(call("simulator/reset").success);
+  expectStop(Reason::kTruckFault);
+  EXPECT_NEAR(truth.station, 14.0, 0.5);
+  EXPECT_TRUE(spinUntil([&] { return call("reset").success; }));
+  engage();
+}
+
 }  // namespace
 }  // namespace tunnel_pilot::shell
 

@@ -114,6 +114,17 @@ TEST_F(TruckControllerTest, StandsBrakedUntilAFrameWithoutSteeringWasSeen) {
   EXPECT_GT(plant.state().speed, 0.9);
 }
 
+TEST_F(TruckControllerTest, RestartedItObeysNobodyUntilAFrameWithoutSteeringWasSeen) {
+  obey(3.0);
+  ASSERT_EQ(controller.state(), State::kObeying);
+  controller.restart();
+  run(3.0);
+  EXPECT_EQ(controller.state(), State::kReady);
+  EXPECT_NEAR(plant.state().speed, 0.0, 1e-3);
+  obey(1.0);
+  EXPECT_EQ(controller.state(), State::kObeying);
+}
+
 TEST_F(TruckControllerTest, FollowsTheCommandedSpeedWithinItsAcceleration) {
   obey();
   command.speed = 5.0;

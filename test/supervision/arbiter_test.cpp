@@ -410,6 +410,27 @@ TEST(Arbiter, StandingBeforeAnObstacleSaysSo) {
   EXPECT_EQ(decision.command.reason, Reason::kObstacle);
 }
 
+TEST(Arbiter, BeforeAnObstacleThatComesAndGoesTheTruckStandsUntilTheWayIsFreeForAWhile) {
+  ArbiterBench bench;
+  bench.motion.speed = 0.0;
+  bench.drive();
+  bench.obstacle = 3.4;
+  bench.cycles(50);
+  for (int i = 0; i < 5; ++i) {
+    bench.obstacle.reset();
+    for (int k = 0; k < 45; ++k) {
+      const Decision& free = bench.cycle();
+      EXPECT_EQ(free.command.speed, 0.0);
+      EXPECT_EQ(free.command.reason, Reason::kObstacle);
+    }
+    bench.obstacle = 3.4;
+    bench.cycle();
+  }
+  bench.obstacle.reset();
+  EXPECT_GT(bench.cycles(60).command.speed, 0.0);
+  EXPECT_EQ(bench.cycle().command.reason, Reason::kNone);
+}
+
 TEST(Arbiter, TellsCorridorClearanceAndDistances) {
   ArbiterBench bench;
   bench.drive();

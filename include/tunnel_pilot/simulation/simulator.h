@@ -69,7 +69,8 @@ class Simulator {
   Simulator(const Simulator&) = delete;
   Simulator& operator=(const Simulator&) = delete;
 
-  /// Puts the truck somewhere, at rest but for `speed` [m/s]. Time goes on; scans under way are lost.
+  /// Puts the truck somewhere, at rest but for `speed` [m/s]. Time goes on; scans under way are lost,
+  /// and the truck obeys nobody until it is engaged anew.
   void place(const geometry::Pose& pose, double speed = 0.0);
 
   /// What one step brought.

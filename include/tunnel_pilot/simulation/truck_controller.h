@@ -89,6 +89,9 @@ class TruckController {
   /// Fault bits (can::TruckFault) that the truck shall tell beside its own. Any of them makes it fail.
   void setFaults(std::uint16_t faults) { injected_faults_ = faults; }
 
+  /// As after the key was turned off and on: obeys nobody until it is engaged anew.
+  void restart();
+
   State state() const { return state_; }
   std::uint16_t faults() const;
 

@@ -162,6 +162,7 @@ class Arbiter {
   std::optional<Steering> deadReckoning(Stamp now) const;
   std::optional<geometry::Pose> placeInCenterline(Stamp now) const;
   Speed chooseSpeed(Stamp now);
+  Speed waitForFreeWay(const Speed& speed, Stamp now);
   bool slowNow(Reason found, Stamp now);
   double freeDistance() const;
   void updateCorridor(double commanded, Stamp now);
@@ -208,6 +209,8 @@ class Arbiter {
   std::optional<Stamp> latched_at_;
   Reason slow_reason_ = Reason::kNone;
   std::optional<Stamp> slow_until_;
+  SpeedLimit waits_for_ = SpeedLimit::kNone;  ///< what the truck stands before
+  std::optional<Stamp> wait_until_;
   int hits_ = 0;
   std::optional<Stamp> last_hit_;
 };
