@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <vector>
 
 #include "tunnel_pilot/can/protection.h"
 
@@ -28,23 +29,43 @@ std::uint64_t toBits(const std::array<std::uint8_t, 8>& data) {
   return bits;
 }
 
-std::uint64_t maskOf(const SignalLayout& signal) {
-  return (std::uint64_t{1} << signal.length) - 1;  // no signal is 64 bits long
-}
+/// A signal's layout with all that every frame would have to work out anew.
+struct Signal {
+  explicit Signal(const SignalLayout& layout)
+      : start(layout.start),
+        factor(layout.factor),
+        si_per_unit(siPerUnit(layout.unit)),
+        mask((std::uint64_t{1} << layout.length) - 1),  // no signal is 64 bits long
+        sign_bit(layout.is_signed ? std::int64_t{1} << (layout.length - 1) : 0),
+        min(std::llround(layout.min / layout.factor)),
+        max(std::llround(layout.max / layout.factor)) {}
 
-bool inRange(const SignalLayout& signal, std::int64_t raw) {
-  return raw >= std::llround(signal.min / signal.factor) &&
-         raw <= std::llround(signal.max / signal.factor);
-}
+  bool holds(std::int64_t raw) const { return raw >= min && raw <= max; }
+
+  int start;
+  double factor;
+  double si_per_unit;
+  std::uint64_t mask;
+  std::int64_t sign_bit;  ///< 0: unsigned
+  std::int64_t min, max;  ///< raw
+};
+
+struct Coding {
+  explicit Coding(std::uint32_t id)
+      : layout(*findLayout(id)), payload(layout.signals.begin() + 1, layout.signals.end()) {}
+
+  const FrameLayout& layout;
+  std::vector<Signal> payload;  ///< the signals behind the CRC
+};
 
 /// Takes the fields in the order of the layout and sets their bits.
 class Writer {
  public:
-  explicit Writer(const FrameLayout& layout) : signal_(layout.signals.data() + 1) {}
+  explicit Writer(const Coding& coding) : signal_(coding.payload.data()) {}
 
   void operator()(double value) {
-    const SignalLayout& signal = *signal_++;
-    const double raw = value / siPerUnit(signal.unit) / signal.factor;
+    const Signal& signal = *signal_++;
+    const double raw = value / signal.si_per_unit / signal.factor;
     if (!std::isfinite(raw) || std::abs(raw) > 4.3e9) {  // beyond any signal: llround is safe below
       good_ = false;
       return;
@@ -60,12 +81,12 @@ class Writer {
   std::uint64_t bits() const { return bits_; }
 
  private:
-  void put(const SignalLayout& signal, std::int64_t raw) {
-    if (!inRange(signal, raw)) good_ = false;
-    bits_ |= (static_cast<std::uint64_t>(raw) & maskOf(signal)) << signal.start;
+  void put(const Signal& signal, std::int64_t raw) {
+    if (!signal.holds(raw)) good_ = false;
+    bits_ |= (static_cast<std::uint64_t>(raw) & signal.mask) << signal.start;
   }
 
-  const SignalLayout* signal_;
+  const Signal* signal_;
   std::uint64_t bits_ = 0;
   bool good_ = true;
 };
@@ -73,12 +94,11 @@ class Writer {
 /// Takes the fields in the order of the layout and fills them from the bits.
 class Reader {
  public:
-  Reader(const FrameLayout& layout, std::uint64_t bits)
-      : signal_(layout.signals.data() + 1), bits_(bits) {}
+  Reader(const Coding& coding, std::uint64_t bits) : signal_(coding.payload.data()), bits_(bits) {}
 
   void operator()(double& value) {
-    const SignalLayout& signal = *signal_;
-    value = static_cast<double>(get()) * signal.factor * siPerUnit(signal.unit);
+    const Signal& signal = *signal_;
+    value = static_cast<double>(get()) * signal.factor * signal.si_per_unit;
   }
   template <class Integer>
   void operator()(Integer& value) {
@@ -89,15 +109,14 @@ class Reader {
 
  private:
   std::int64_t get() {
-    const SignalLayout& signal = *signal_++;
-    auto raw = static_cast<std::int64_t>((bits_ >> signal.start) & maskOf(signal));
-    const std::int64_t sign_bit = std::int64_t{1} << (signal.length - 1);
-    if (signal.is_signed && (raw & sign_bit) != 0) raw -= 2 * sign_bit;
-    if (!inRange(signal, raw)) good_ = false;
+    const Signal& signal = *signal_++;
+    auto raw = static_cast<std::int64_t>((bits_ >> signal.start) & signal.mask);
+    if ((raw & signal.sign_bit) != 0) raw -= 2 * signal.sign_bit;
+    if (!signal.holds(raw)) good_ = false;
     return raw;
   }
 
-  const SignalLayout* signal_;
+  const Signal* signal_;
   std::uint64_t bits_;
   bool good_ = true;
 };
@@ -192,6 +211,12 @@ struct Description<Coils2Frame> {
   }
 };
 
+template <class Fields>
+const Coding& codingOf() {
+  static const Coding coding(Description<Fields>::kId);
+  return coding;
+}
+
 }  // namespace
 
 std::uint8_t frameCrc(const FrameLayout& layout, const Frame& frame) {
@@ -203,26 +228,27 @@ std::uint8_t frameCrc(const FrameLayout& layout, const Frame& frame) {
 
 template <class Fields>
 std::optional<Frame> encode(const Fields& fields) {
-  const FrameLayout& layout = *findLayout(Description<Fields>::kId);
-  Writer writer(layout);
+  const Coding& coding = codingOf<Fields>();
+  Writer writer(coding);
   Description<Fields>::visit(writer, fields);
   if (!writer.good()) return std::nullopt;
   Frame frame;
-  frame.id = layout.id;
+  frame.id = coding.layout.id;
   frame.length = kFrameLength;
   for (std::size_t i = 0; i < 8; ++i)
     frame.data[i] = static_cast<std::uint8_t>(writer.bits() >> (8 * i));
-  frame.data[0] = frameCrc(layout, frame);
+  frame.data[0] = frameCrc(coding.layout, frame);
   return frame;
 }
 
 template <class Fields>
 std::optional<Fields> decode(const Frame& frame) {
-  const FrameLayout& layout = *findLayout(Description<Fields>::kId);
-  if (frame.id != layout.id || frame.extended || frame.length != kFrameLength) return std::nullopt;
-  if (frame.data[0] != frameCrc(layout, frame)) return std::nullopt;
+  const Coding& coding = codingOf<Fields>();
+  if (frame.id != coding.layout.id || frame.extended || frame.length != kFrameLength)
+    return std::nullopt;
+  if (frame.data[0] != frameCrc(coding.layout, frame)) return std::nullopt;
   Fields fields;
-  Reader reader(layout, toBits(frame.data));
+  Reader reader(coding, toBits(frame.data));
   Description<Fields>::visit(reader, fields);
   if (!reader.good()) return std::nullopt;
   return fields;

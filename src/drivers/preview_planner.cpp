@@ -31,6 +31,12 @@ void PreviewPlanner::reset() { rates_.fill(0.0); }
 
 PathState PreviewPlanner::advance(const PathState& now, double command_rate, double speed,
                                   double curvature, const YawResponse& believed, double step) const {
+  return advance(now, std::cos(now.heading_error), command_rate, speed, curvature, believed, step);
+}
+
+PathState PreviewPlanner::advance(const PathState& now, double cos_heading_error, double command_rate,
+                                  double speed, double curvature, const YawResponse& believed,
+                                  double step) const {
   const double share = step == step_ ? share_ : lagShare(step, truck_.lag);
   const double most = truck_.max_rate * step;
   const double turn_of_hinge =
@@ -45,8 +51,7 @@ PathState PreviewPlanner::advance(const PathState& now, double command_rate, dou
       travel * believed.disturbance;
   const double slip = -truck_.slip_compliance * speed * turn / step +
                       (believed.gain - 1.0) * std::sin(middle) / (1.0 + std::cos(middle));
-  const double advance_on_path =
-      travel * std::cos(now.heading_error) / curvatureRoom(curvature, now.offset);
+  const double advance_on_path = travel * cos_heading_error / curvatureRoom(curvature, now.offset);
   const double error_growth = turn - curvature * advance_on_path;
   PathState next;
   next.s = now.s + advance_on_path;
@@ -132,11 +137,12 @@ double PreviewPlanner::roll(const PathState& now, const geometry::Path& path, do
       rates_[k] = std::clamp(nominal_rates_[k] + correction * corrections_[k] + gains_[k].dot(change),
                              -rateLimit(k), rateLimit(k));
     }
-    const double ahead = std::max(least_step, speed * step_ * std::cos(state.heading_error));
+    const double cosine = std::cos(state.heading_error);
+    const double ahead = std::max(least_step, speed * step_ * cosine);
     const double next_heading = cursor.headingAt(state.s + ahead);
     curvatures_[k] = (next_heading - heading) / ahead;
     states_[k] = state;
-    state = advance(state, rates_[k], speed, curvatures_[k], believed, step_);
+    state = advance(state, cosine, rates_[k], speed, curvatures_[k], believed, step_);
     heading = cursor.headingAt(state.s);
     const double factor = k + 1 == kStages ? weights_.terminal : 1.0;
     sum +=

@@ -12,8 +12,8 @@ namespace tunnel_pilot::geometry {
 namespace {
 
 // Nodes and weights of the five-point Gauss-Legendre rule on [-1, 1].
-constexpr std::array<double, 5> kNodes = {-0.906179845938664, -0.538469310105683, 0.0,
-                                          0.538469310105683, 0.906179845938664};
+constexpr std::array<double, 5> kNodes = {-0.906179845938664, -0.538469310105683, 0.0, 0.538469310105683,
+                                          0.906179845938664};
 constexpr std::array<double, 5> kWeights = {0.236926885056189, 0.478628670499366, 0.568888888888889,
                                             0.478628670499366, 0.236926885056189};
 
@@ -78,9 +78,11 @@ PathPoint Path::at(double s) const {
           a.curvature + t * (b.curvature - a.curvature)};
 }
 
+// Finds the nearest segment first: all that is told of the foot point is worked out for that one alone.
 PathProjection Path::projectRange(const Point& point, std::size_t first, std::size_t last) const {
-  double best_distance = std::numeric_limits<double>::infinity();
-  PathProjection best;
+  double nearest = std::numeric_limits<double>::infinity();  // squared
+  std::size_t segment = first;
+  double share = 0.0;
   for (std::size_t i = first; i < last; ++i) {
     const PathPoint& a = points_[i];
     const PathPoint& b = points_[i + 1];
@@ -91,17 +93,19 @@ PathProjection Path::projectRange(const Point& point, std::size_t first, std::si
     const bool open_end = !closed_ && i + 2 == points_.size();
     if (!open_start) t = std::max(t, 0.0);
     if (!open_end) t = std::min(t, 1.0);
-    const Point foot = t * chord;
-    const double distance = (to_point - foot).norm();
-    if (distance >= best_distance) continue;
-    best_distance = distance;
-    const double side = chord.x() * to_point.y() - chord.y() * to_point.x();
-    const double inside = std::clamp(t, 0.0, 1.0);
-    best = {a.s + t * (b.s - a.s), std::copysign(distance, side),
-            interpolateAngle(a.heading, b.heading, inside),
-            a.curvature + inside * (b.curvature - a.curvature)};
+    const double distance = (to_point - t * chord).squaredNorm();
+    if (distance >= nearest) continue;
+    nearest = distance;
+    segment = i;
+    share = t;
   }
-  return best;
+  const PathPoint& a = points_[segment];
+  const PathPoint& b = points_[segment + 1];
+  const double side = (b.x - a.x) * (point.y() - a.y) - (b.y - a.y) * (point.x() - a.x);
+  const double inside = std::clamp(share, 0.0, 1.0);
+  return {a.s + share * (b.s - a.s), std::copysign(std::sqrt(nearest), side),
+          interpolateAngle(a.heading, b.heading, inside),
+          a.curvature + inside * (b.curvature - a.curvature)};
 }
 
 PathProjection Path::project(const Point& point) const {

@@ -9,7 +9,7 @@ namespace {
 
 using geometry::Point;
 
-constexpr std::size_t kChunkSegments = 32;
+constexpr std::size_t kChunkSegments = 16;
 
 double cross(const Point& a, const Point& b) { return a.x() * b.y() - a.y() * b.x(); }
 
@@ -34,12 +34,6 @@ double squaredDistance(const ClearanceMeter::Edge& a, const ClearanceMeter::Edge
                    squaredDistance(b.start, a), squaredDistance(b.start + b.along, a)});
 }
 
-double distance(const Point& p, const std::vector<ClearanceMeter::Edge>& outline) {
-  double nearest = std::numeric_limits<double>::infinity();
-  for (const ClearanceMeter::Edge& edge : outline) nearest = std::min(nearest, squaredDistance(p, edge));
-  return std::sqrt(nearest);
-}
-
 double distance(const ClearanceMeter::Edge& wall, const std::vector<ClearanceMeter::Edge>& outline) {
   double nearest = std::numeric_limits<double>::infinity();
   for (const ClearanceMeter::Edge& edge : outline)
@@ -47,11 +41,45 @@ double distance(const ClearanceMeter::Edge& wall, const std::vector<ClearanceMet
   return std::sqrt(nearest);
 }
 
-// True when a circle round `a` may come nearer than `distance` to one round `b`.
-bool mayBeNearer(const Point& a, const Point& b, double radii, double distance) {
-  const double reach = distance + radii;
-  return (a - b).squaredNorm() < reach * reach;
-}
+// Box round an outline, in line with its first edge (for a truck's body the outline itself): nothing is
+// nearer to the outline than to the box.
+class Box {
+ public:
+  explicit Box(const std::vector<ClearanceMeter::Edge>& outline) : along_(1.0, 0.0) {
+    const double length = outline.front().along.norm();
+    if (length > 0.0) along_ = outline.front().along / length;
+    Point low = turned(outline.front().start);
+    Point high = low;
+    for (const ClearanceMeter::Edge& edge : outline) {
+      low = low.cwiseMin(turned(edge.start));
+      high = high.cwiseMax(turned(edge.start));
+    }
+    middle_ = 0.5 * (low + high);
+    half_ = 0.5 * (high - low);
+  }
+
+  // Seen from the box: its axes are those of the box, its origin the box's middle.
+  Point local(const Point& p) const { return turned(p) - middle_; }
+
+  double squaredDistance(const Point& local) const {
+    return (local.cwiseAbs() - half_).cwiseMax(0.0).squaredNorm();
+  }
+
+  // Squared distance to the upright rectangle that has these corners: no part of the straight line
+  // between them is nearer.
+  double squaredDistance(const Point& a, const Point& b) const {
+    const Point above = a.cwiseMin(b) - half_;
+    const Point below = -a.cwiseMax(b) - half_;
+    return above.cwiseMax(below).cwiseMax(0.0).squaredNorm();
+  }
+
+ private:
+  Point turned(const Point& p) const { return {along_.dot(p), cross(along_, p)}; }
+
+  Point along_;
+  Point middle_;
+  Point half_;
+};
 
 }  // namespace
 
@@ -75,42 +103,45 @@ ClearanceMeter::ClearanceMeter(const std::vector<world::WallChain>& walls) {
   for (const world::WallChain& wall : walls) {
     for (std::size_t first = 0; first + 1 < wall.size(); first += kChunkSegments) {
       const std::size_t last = std::min(first + kChunkSegments, wall.size() - 1);
-      Chunk chunk{boundingCircle(&wall[first], last - first + 1), {}};
+      const std::size_t count = last - first + 1;
+      Chunk chunk{boundingCircle(&wall[first], count), {&wall[first], &wall[first] + count}, {}};
       for (std::size_t i = first; i < last; ++i) {
-        chunk.segments.push_back({boundingCircle(&wall[i], 2), edgeBetween(wall[i], wall[i + 1])});
+        chunk.edges.push_back(edgeBetween(wall[i], wall[i + 1]));
       }
       chunks_.push_back(std::move(chunk));
     }
   }
 }
 
-double ClearanceMeter::clearance(const std::vector<Point>& outline) const {
-  const Circle body = boundingCircle(outline.data(), outline.size());
+double ClearanceMeter::clearance(const std::vector<Point>& outline) {
   std::vector<Edge> edges;
+  edges.reserve(outline.size());
   for (std::size_t i = 0; i < outline.size(); ++i) {
     edges.push_back(edgeBetween(outline[i], outline[(i + 1) % outline.size()]));
   }
-  double nearest = std::numeric_limits<double>::infinity();
-  const auto look = [&](const Chunk& chunk) {
-    for (const Segment& segment : chunk.segments) {
-      const Circle& circle = segment.circle;
-      if (!mayBeNearer(circle.centre, body.centre, circle.radius + body.radius, nearest)) continue;
-      if (distance(circle.centre, edges) - circle.radius >= nearest) continue;
-      nearest = std::min(nearest, distance(segment.edge, edges));
+  if (chunks_.empty()) return std::numeric_limits<double>::infinity();
+  const Box box(edges);
+  // The edge that was nearest last time still is or nearly so, which rules most of the others out.
+  double nearest = distance(chunks_[nearest_chunk_].edges[nearest_edge_], edges);
+  const auto measure = [&](std::size_t index) {
+    const Chunk& chunk = chunks_[index];
+    Point before = box.local(chunk.vertices.front());
+    for (std::size_t i = 0; i < chunk.edges.size(); ++i) {
+      const Point after = box.local(chunk.vertices[i + 1]);
+      const bool may_be_nearer = box.squaredDistance(before, after) < nearest * nearest;
+      before = after;
+      if (!may_be_nearer) continue;
+      const double found = distance(chunk.edges[i], edges);
+      if (found >= nearest) continue;
+      nearest = found;
+      nearest_chunk_ = index;
+      nearest_edge_ = i;
     }
   };
-  // The chunk that seems nearest first: it rules most of the others out.
-  const auto power = [&](const Chunk& chunk) {
-    return (chunk.circle.centre - body.centre).squaredNorm() - chunk.circle.radius * chunk.circle.radius;
-  };
-  const auto first =
-      std::min_element(chunks_.begin(), chunks_.end(),
-                       [&](const Chunk& a, const Chunk& b) { return power(a) < power(b); });
-  if (first != chunks_.end()) look(*first);
-  for (const Chunk& chunk : chunks_) {
-    if (&chunk == &*first) continue;
-    if (mayBeNearer(chunk.circle.centre, body.centre, chunk.circle.radius + body.radius, nearest))
-      look(chunk);
+  for (std::size_t i = 0; i < chunks_.size(); ++i) {
+    const Circle& circle = chunks_[i].circle;
+    const double reach = nearest + circle.radius;
+    if (box.squaredDistance(box.local(circle.centre)) < reach * reach) measure(i);
   }
   return nearest;
 }

@@ -43,7 +43,8 @@ Simulator::Simulator(const SimulatorParameters& parameters, const TruckControlle
       accelerometer_(parameters.accelerometer, seed, Stream::kAccelerometer),
       step_(fromSeconds(parameters.step)),
       truth_period_(fromSeconds(1.0 / parameters.truth_rate)),
-      sensor_period_(fromSeconds(1.0 / parameters.sensor_rate)) {
+      sensor_period_(fromSeconds(1.0 / parameters.sensor_rate)),
+      sweep_duration_(fromSeconds(lidar_.sweepDuration())) {
   if (!world_.design_line.empty()) line_.emplace(world_.design_line);
   if (load == vehicle::Load::kLoaded) {
     sensed_.payload = truck.loaded.front + truck.loaded.rear - truck.empty.front - truck.empty.rear;
@@ -111,16 +112,16 @@ Pose Simulator::poseAt(Stamp stamp) const {
 
 void Simulator::runLidar() {
   if (!sweeping_) {
-    const Stamp next = fromSeconds(static_cast<double>(sweeps_) / parameters_.lidar.rate);
+    const Stamp next = next_sweep_;
     if (next > now_) return;
-    ++sweeps_;
+    next_sweep_ = fromSeconds(static_cast<double>(++sweeps_) / parameters_.lidar.rate);
     if (next < now_ - step_) return;  // a sweep that would have begun before the truck was placed
     sweeping_ = true;
     sweep_stamp_ = next;
     sweep_start_ = poseAt(next);
     sweep_truth_ = truthAt(next);
   }
-  const Stamp end = sweep_stamp_ + fromSeconds(lidar_.sweepDuration());
+  const Stamp end = sweep_stamp_ + sweep_duration_;
   if (end > now_) return;
   sweeping_ = false;
   if (!world_.obstacles.empty()) caster_.setMovingChains(obstaclesAt(sweep_stamp_));
@@ -181,7 +182,7 @@ std::vector<world::WallChain> Simulator::obstaclesAt(Stamp stamp) const {
   return chains;
 }
 
-double Simulator::clearanceOf(const std::vector<geometry::Point>& outline) const {
+double Simulator::clearanceOf(const std::vector<geometry::Point>& outline) {
   const double walls = clearance_meter_.clearance(outline);
   if (world_.obstacles.empty()) return walls;
   return std::min(walls, world::clearance(outline, obstaclesAt(now_)));

@@ -43,7 +43,10 @@ std::string toString(TruckController::State state) {
 }
 
 TruckController::TruckController(const TruckControllerParameters& parameters, can::Bus& bus)
-    : parameters_(parameters), bus_(bus) {}
+    : parameters_(parameters),
+      frame_period_(fromSeconds(parameters.frame_period)),
+      command_timeout_(fromSeconds(parameters.command_timeout)),
+      bus_(bus) {}
 
 std::uint16_t TruckController::faults() const {
   return static_cast<std::uint16_t>(own_faults_ | injected_faults_);
@@ -100,7 +103,7 @@ void TruckController::takeCommand(const can::Frame& frame, Stamp now) {
 }
 
 bool TruckController::commandFresh(Stamp now) const {
-  return command_received_ && now - *command_received_ <= fromSeconds(parameters_.command_timeout);
+  return command_received_ && now - *command_received_ <= command_timeout_;
 }
 
 // -------- what it decides
@@ -214,8 +217,8 @@ double TruckController::followSpeed(double wanted, double limit, double speed, d
 
 void TruckController::sendFrames(const SensedTruck& truck, Stamp now) {
   if (next_frames_ && now < *next_frames_) return;
-  const Stamp period = fromSeconds(parameters_.frame_period);
-  next_frames_ = next_frames_ && now < *next_frames_ + period ? *next_frames_ + period : now + period;
+  const bool in_step = next_frames_ && now < *next_frames_ + frame_period_;
+  next_frames_ = (in_step ? *next_frames_ : now) + frame_period_;
   counter_ = can::nextCounter(counter_);
   const auto send = [this](const std::optional<can::Frame>& frame) {
     if (frame) bus_.send(*frame);

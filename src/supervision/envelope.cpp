@@ -9,6 +9,7 @@
 namespace tunnel_pilot::supervision {
 namespace {
 
+using geometry::Frame;
 using geometry::Point;
 using geometry::Pose;
 
@@ -20,7 +21,6 @@ constexpr double kMemoryReach = 12.0;      // [m] from base_link: beyond the tai
 constexpr double kLongestWallPiece = 3.0;  // [m] a longer gap is not bridged
 constexpr double kSlowest = 0.5;           // [m/s] for the steering's slope over the way
 
-Point direction(double heading) { return {std::cos(heading), std::sin(heading)}; }
 Point leftOf(const Point& d) { return {-d.y(), d.x()}; }
 
 }  // namespace
@@ -46,6 +46,17 @@ Envelope::Envelope(const EnvelopeParameters& parameters, const CommandLimiterPar
                    const vehicle::TruckGeometry& geometry)
     : parameters_(parameters), limits_(limits), geometry_(geometry) {
   stations_.reserve(static_cast<std::size_t>(parameters.horizon / kStep) + 32);
+  const double rear = geometry.rear_axle_to_hinge;
+  const double rear_axle = -geometry.front_axle_to_hinge - rear;
+  const auto onFront = [](double x) { return OutlinePoint{x, std::floor(x / kStep)}; };
+  const auto onRear = [&](double x) { return OutlinePoint{x, std::floor((rear_axle + x) / kStep)}; };
+  outline_ = {onFront(geometry.front_overhang),
+              onFront(0.0),
+              onFront(-geometry.front_axle_to_hinge),
+              onRear(rear),
+              onRear(0.5 * rear),
+              onRear(0.0),
+              onRear(-geometry.rear_overhang)};
 }
 
 void Envelope::reset() { remembered_ = 0; }
@@ -71,20 +82,21 @@ const Envelope::Result& Envelope::update(const Input& input) {
   return result_;
 }
 
-void Envelope::addStation(const Point& point, double heading, double s) {
-  stations_.push_back({point, direction(heading), s, -kInfinity, kInfinity, kInfinity, -kInfinity});
+void Envelope::addStation(const Point& point, const Point& direction, double s) {
+  stations_.push_back({point, direction, s, -kInfinity, kInfinity, kInfinity, -kInfinity});
 }
 
 // The spine from the tail through rear body, hinge and front body to the front axle.
 void Envelope::layTruck(const Input& input) {
-  const Pose rear = vehicle::rearPose(geometry_, input.truck, input.articulation);
+  const Frame front(input.truck);
+  const Frame rear = vehicle::rearFrame(geometry_, front, input.articulation);
   const double hinge = geometry_.front_axle_to_hinge;
   const double tail = hinge + geometry_.rear_axle_to_hinge + geometry_.rear_overhang;
   for (double back = std::ceil(tail); back > 0.5; back -= kStep) {
     const bool on_front = back <= hinge;
-    const Pose& body = on_front ? input.truck : rear;
+    const Frame& body = on_front ? front : rear;
     const double x = on_front ? -back : geometry_.rear_axle_to_hinge + hinge - back;
-    addStation(body.transform({x, 0.0}), body.heading, -back);
+    addStation(body.transform({x, 0.0}), body.direction(), -back);
   }
   front_axle_ = stations_.size();
 }
@@ -97,15 +109,18 @@ void Envelope::layWay(const Input& input) {
   const bool on_path = !input.profile.empty();
   geometry::PathProjection place;
   const Pose on_centerline = input.path_frame.relative(input.truck);
-  if (on_path) place = input.centerline.project(on_centerline.position());
+  if (on_path) {
+    place = input.centerline.project(on_centerline.position());
+    path_ahead_ = input.centerline.points().back().s - place.s;
+  }
   double heading_error = geometry::wrapAngle(on_centerline.heading - place.heading);
-  Pose pose = input.truck;
+  Frame front(input.truck);
   double articulation = input.articulation;
   std::vector<Posture>& postures = postures_;
   postures.clear();
   for (double s = 0.0;; s += kStep) {
-    addStation(pose.position(), pose.heading, s);
-    postures.push_back({pose, articulation});
+    addStation(front.pose().position(), front.direction(), s);
+    postures.push_back({front, articulation});
     if (s + kStep > way) break;
     const double target =
         on_path && s >= held
@@ -115,16 +130,16 @@ void Envelope::layWay(const Input& input) {
     const double change = std::clamp(target - articulation, -slope * kStep, slope * kStep);
     const double turn = vehicle::yawRate(geometry_, kStep, articulation + 0.5 * change, change);
     articulation += change;
-    pose = pose.compose({kStep * std::cos(0.5 * turn), kStep * std::sin(0.5 * turn), turn});
+    front = Frame(front.compose({kStep * std::cos(0.5 * turn), kStep * std::sin(0.5 * turn), turn}));
     if (!on_path) continue;
     const double curvature = input.profile.curvatureAt(place.s);
     place.lateral_offset += kStep * std::sin(heading_error + 0.5 * (turn - curvature * kStep));
     place.s += kStep;
     heading_error += turn - curvature * kStep;
   }
-  const Pose& last = postures.back().front;
+  const Frame& last = postures.back().front;
   for (double beyond = kStep; beyond < geometry_.front_overhang + kStep; beyond += kStep) {
-    addStation(last.transform({beyond, 0.0}), last.heading, stations_.back().s + kStep);
+    addStation(last.transform({beyond, 0.0}), last.direction(), stations_.back().s + kStep);
   }
   for (std::size_t i = 0; i < postures.size(); ++i) sweepBodies(front_axle_ + i, postures[i], i == 0);
 }
@@ -132,25 +147,18 @@ void Envelope::layWay(const Input& input) {
 // Each outline point's way from posture to posture is a line beside the spine; of the first posture the
 // sides themselves are laid, from point to point.
 void Envelope::sweepBodies(std::size_t station, const Posture& posture, bool first) {
-  const Pose rear = vehicle::rearPose(geometry_, posture.front, posture.articulation);
+  const Frame rear = vehicle::rearFrame(geometry_, posture.front, posture.articulation);
   const double half = 0.5 * geometry_.overall_width;
-  const double hinge = geometry_.front_axle_to_hinge;
-  const double rear_hinge = geometry_.rear_axle_to_hinge;
-  const std::array<double, kOutline> along = {
-      geometry_.front_overhang, 0.0, -hinge, rear_hinge, 0.5 * rear_hinge, 0.0,
-      -geometry_.rear_overhang};
   for (std::size_t i = 0; i < kOutline; ++i) {
-    const bool on_front = i < kFrontOutline;
-    const Pose& body = on_front ? posture.front : rear;
-    const double from_axle = on_front ? along[i] : along[i] - hinge - rear_hinge;
+    const Frame& body = i < kFrontOutline ? posture.front : rear;
     const auto near = static_cast<std::size_t>(
-        std::max(0.0, static_cast<double>(station) + std::floor(from_axle / kStep)));
+        std::max(0.0, static_cast<double>(station) + outline_[i].stations_ahead));
     for (const bool left : {true, false}) {
-      const Beside place = beside(body.transform({along[i], left ? half : -half}), near);
-      Beside& last = outline_[left ? i : kOutline + i];
+      const Beside place = beside(body.transform({outline_[i].along, left ? half : -half}), near);
+      Beside& last = swept_[left ? i : kOutline + i];
       if (!first) layEdge(last, place, left);
       if (first && i != 0 && i != kFrontOutline)
-        layEdge(outline_[left ? i - 1 : kOutline + i - 1], place, left);
+        layEdge(swept_[left ? i - 1 : kOutline + i - 1], place, left);
       last = place;
     }
   }
@@ -208,11 +216,12 @@ void Envelope::layWall(const Input& input, bool left) {
     if (last) layWallPiece(*last, place, left);
     last = place;
   };
+  const Frame scan(input.scan_pose);
   const std::size_t oldest = remembered_ - std::min(remembered_, memory_.size());
   for (std::size_t i = oldest; i < remembered_; ++i) {
     const Remembered& passed = memory_[i % memory_.size()];
     if (passed.left != left) continue;
-    const Point point = input.scan_pose.inverseTransform(passed.point);
+    const Point point = scan.inverseTransform(passed.point);
     if (point.squaredNorm() < kMemoryReach * kMemoryReach) lay(beside(point, front_axle_));
   }
   if (!wall.found) return;
@@ -243,10 +252,7 @@ void Envelope::endFreeSpace(double s, End why) {
 }
 
 void Envelope::limitSight(const Input& input) {
-  if (input.profile.empty()) return endFreeSpace(wall_end_, End::kSight);
-  const Point front_axle = input.path_frame.inverseTransform(input.truck.position());
-  const double here = input.centerline.project(front_axle).s;
-  endFreeSpace(input.centerline.points().back().s - here, End::kSight);
+  endFreeSpace(input.profile.empty() ? wall_end_ : path_ahead_, End::kSight);
 }
 
 void Envelope::compareWalls() {

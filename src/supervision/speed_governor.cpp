@@ -65,6 +65,7 @@ SpeedGovernor::Limit SpeedGovernor::alongPath(const drivers::ArticulationProfile
                                               double s) const {
   Limit lowest{parameters_.max_speed, SpeedLimit::kNone};
   const auto take = [&](double speed, double distance, SpeedLimit by) {
+    if (speed >= lowest.speed) return;  // braking to it allows no less
     const double allowed = brakingTo(speed, distance, parameters_.bend_deceleration);
     if (allowed < lowest.speed) lowest = {allowed, by};
   };

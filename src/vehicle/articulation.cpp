@@ -7,7 +7,7 @@ namespace tunnel_pilot::vehicle {
 namespace {
 
 // Corners of a body of the truck's width from x = `back` to x = `front` in its own frame.
-std::vector<geometry::Point> rectangle(const geometry::Pose& frame, double back, double front,
+std::vector<geometry::Point> rectangle(const geometry::Frame& frame, double back, double front,
                                        double width) {
   const double y = 0.5 * width;
   return {frame.transform({back, -y}), frame.transform({front, -y}), frame.transform({front, y}),
@@ -40,19 +40,25 @@ double articulationSlope(const TruckGeometry& truck, double curvature, double ar
   return (curvature * arm - std::sin(articulation)) / truck.rear_axle_to_hinge;
 }
 
+geometry::Frame rearFrame(const TruckGeometry& truck, const geometry::Frame& front,
+                          double articulation) {
+  const geometry::Frame hinge(front.compose({-truck.front_axle_to_hinge, 0.0, -articulation}));
+  return hinge.shifted({-truck.rear_axle_to_hinge, 0.0});
+}
+
 geometry::Pose rearPose(const TruckGeometry& truck, const geometry::Pose& front, double articulation) {
-  const geometry::Pose hinge = front.compose({-truck.front_axle_to_hinge, 0.0, -articulation});
-  return hinge.compose({-truck.rear_axle_to_hinge, 0.0, 0.0});
+  return rearFrame(truck, geometry::Frame(front), articulation).pose();
 }
 
 std::vector<geometry::Point> frontOutline(const TruckGeometry& truck, const geometry::Pose& front) {
-  return rectangle(front, -truck.front_axle_to_hinge, truck.front_overhang, truck.overall_width);
+  return rectangle(geometry::Frame(front), -truck.front_axle_to_hinge, truck.front_overhang,
+                   truck.overall_width);
 }
 
 std::vector<geometry::Point> rearOutline(const TruckGeometry& truck, const geometry::Pose& front,
                                          double articulation) {
-  return rectangle(rearPose(truck, front, articulation), -truck.rear_overhang, truck.rear_axle_to_hinge,
-                   truck.overall_width);
+  return rectangle(rearFrame(truck, geometry::Frame(front), articulation), -truck.rear_overhang,
+                   truck.rear_axle_to_hinge, truck.overall_width);
 }
 
 }  // namespace tunnel_pilot::vehicle

@@ -32,6 +32,14 @@ DynamicTruck::DynamicTruck(const TruckParameters& parameters, const DynamicTruck
       front_axle_(parameters.front_suspension, staticAxleLoads(parameters, options.load).front),
       rear_axle_(parameters.rear_suspension, staticAxleLoads(parameters, options.load).rear),
       brake_temperature_(options.brake_temperature) {
+  inertia_.mass = masses_.front + masses_.rear;
+  inertia_.front_moment = masses_.front * masses_.front_cg_offset;
+  inertia_.rear_moment = masses_.rear * masses_.rear_cg_offset;
+  const double m = inertia_.mass;
+  const double b_f = inertia_.front_moment;
+  const double b_r = inertia_.rear_moment;
+  inertia_.front = masses_.front_inertia + b_f * masses_.front_cg_offset - b_f * b_f / m;
+  inertia_.rear = masses_.rear_inertia + b_r * masses_.rear_cg_offset - b_r * b_r / m;
   if (options.rough_road) {
     road_ = std::make_shared<const RoadProfile>(parameters.road_roughness, options.road_seed);
   }
@@ -136,9 +144,9 @@ double DynamicTruck::hingeTorque() const {
 // M q'' = Q in axes that coincide with the front body's (theta_f = 0, theta_r = -gamma); the hinge's
 // acceleration is eliminated, which leaves two equations for the bodies' angular accelerations.
 DynamicTruck::Accelerations DynamicTruck::solve(double grade) const {
-  const double m = masses_.front + masses_.rear;
-  const double b_f = masses_.front * masses_.front_cg_offset;
-  const double b_r = masses_.rear * masses_.rear_cg_offset;
+  const double m = inertia_.mass;
+  const double b_f = inertia_.front_moment;
+  const double b_r = inertia_.rear_moment;
   const double s = motion_.sin_gamma;
   const double c = motion_.cos_gamma;
   const double downhill = -kGravity * std::sin(grade);  // gravity along the front body [m/s^2]
@@ -153,8 +161,8 @@ DynamicTruck::Accelerations DynamicTruck::solve(double grade) const {
   const double q_r =
       -parameters_.geometry.rear_axle_to_hinge * rear_force_.y - torque - b_r * s * downhill;
 
-  const double m_ff = masses_.front_inertia + b_f * masses_.front_cg_offset - b_f * b_f / m;
-  const double m_rr = masses_.rear_inertia + b_r * masses_.rear_cg_offset - b_r * b_r / m;
+  const double m_ff = inertia_.front;
+  const double m_rr = inertia_.rear;
   const double m_fr = b_f * b_r * c / m;
   const double p_f = q_f - b_f * q_y / m;
   const double p_r = q_r + b_r * (s * q_x + c * q_y) / m;

@@ -18,11 +18,13 @@ struct Place {
 
 Place place(double s) {
   const double cells = s / kSpacing;
-  const double loops = std::floor(cells / static_cast<double>(kCells));
+  const bool on_first_loop = cells >= 0.0 && cells < static_cast<double>(kCells);
+  const double loops = on_first_loop ? 0.0 : std::floor(cells / static_cast<double>(kCells));
   const double wrapped = cells - loops * static_cast<double>(kCells);
+  const auto whole = static_cast<std::int64_t>(wrapped);
   // Rounding may put a tiny negative `s` on the loop's very end, which is its start.
-  const std::size_t cell = static_cast<std::size_t>(wrapped) % kCells;
-  return {cell, (wrapped - std::floor(wrapped)) * kSpacing};
+  const std::size_t cell = static_cast<std::size_t>(whole) % kCells;
+  return {cell, (wrapped - static_cast<double>(whole)) * kSpacing};
 }
 
 }  // namespace

@@ -106,18 +106,18 @@ class Layout {
 
 }  // namespace
 
-void drawRandomTunnel(Node& world, TunnelPlan& plan) {
+TunnelWalls drawRandomTunnel(Node& world, TunnelPlan& plan) {
   const LayoutRanges ranges = readRanges(world);
   plan.separation = world.number("separation", "m", 0.0, 10.0);
   Draws draws(plan.seed, kLayoutStream);
-  std::string conflict;
+  TunnelWalls walls;
   for (int i = 0; i < kMaxDraws; ++i) {
     Layout(ranges, draws).draw(plan);
-    conflict = buildWalls(plan).conflict;
-    if (conflict.empty()) return;
+    walls = buildWalls(plan);
+    if (walls.conflict.empty()) return walls;
   }
   world.refuse("min_length", "[m]: no layout suits in " + std::to_string(kMaxDraws) +
-                                 " draws; the last one " + conflict);
+                                 " draws; the last one " + walls.conflict);
 }
 
 }  // namespace tunnel_pilot::world

@@ -46,12 +46,32 @@ struct Bounds {
   float radius;  // of the circle about the middle [m]
 };
 
+// Bounds of a group's chunks, field by field, so that all can be looked at together.
+struct GroupedBounds {
+  alignas(32) double x[kGroup];
+  alignas(32) double y[kGroup];
+  alignas(32) float along_x[kGroup];
+  alignas(32) float along_y[kGroup];
+  alignas(32) float thickness[kGroup];
+  alignas(32) float radius[kGroup];
+
+  void set(std::size_t i, const Bounds& b) {
+    x[i] = b.x;
+    y[i] = b.y;
+    along_x[i] = b.along_x;
+    along_y[i] = b.along_y;
+    thickness[i] = b.thickness;
+    radius[i] = b.radius;
+  }
+};
+
 // Chains cut into chunks of at most kSegments segments, and groups of kGroup chunks.
 class ChunkList {
  public:
   void assign(const std::vector<WallChain>& chains) {
     bounds.clear();
     groups.clear();
+    grouped.clear();
     x.clear();
     y.clear();
     for (const WallChain& chain : chains) {
@@ -62,9 +82,10 @@ class ChunkList {
     for (std::size_t first = 0; first < bounds.size(); first += kGroup) addGroup(first);
   }
 
-  std::vector<Bounds> bounds;  // of the chunks
-  std::vector<Bounds> groups;  // the circles round groups
-  std::vector<double> x;       // kVertices a chunk [m]
+  std::vector<Bounds> bounds;          // of the chunks
+  std::vector<Bounds> groups;          // the circles round groups
+  std::vector<GroupedBounds> grouped;  // the chunks' bounds again, the last one repeated at the end
+  std::vector<double> x;               // kVertices a chunk [m]
   std::vector<double> y;
 
  private:
@@ -81,6 +102,10 @@ class ChunkList {
     }
     const float circle = static_cast<float>(radius) + kSlack;
     groups.push_back({middle.x(), middle.y(), 0.0F, 0.0F, circle, circle});
+    grouped.emplace_back();
+    for (std::size_t i = 0; i < kGroup; ++i) {
+      grouped.back().set(i, bounds[std::min(first + i, bounds.size() - 1)]);
+    }
   }
 
   void add(const Point* vertices, std::size_t count) {
@@ -120,17 +145,30 @@ struct View {
 
   // False when what is enclosed lies out of range or beside all beams.
   bool mayMeet(const Bounds& b) const {
-    const auto dx = static_cast<float>(b.x - x);
-    const auto dy = static_cast<float>(b.y - y);
-    const float reach = range_max + b.radius;
-    if (dx * dx + dy * dy > reach * reach) return false;
+    return mayMeet(b.x, b.y, b.along_x, b.along_y, b.thickness, b.radius) != 0;
+  }
+
+  // The same for all chunks of a group.
+  void mayMeet(const GroupedBounds& b, int* meets) const {
+    for (std::size_t i = 0; i < kGroup; ++i) {
+      meets[i] = mayMeet(b.x[i], b.y[i], b.along_x[i], b.along_y[i], b.thickness[i], b.radius[i]);
+    }
+  }
+
+  // Numbers and no branches, for vector loops.
+  int mayMeet(double middle_x, double middle_y, float along_x, float along_y, float thickness,
+              float radius) const {
+    const auto dx = static_cast<float>(middle_x - x);
+    const auto dy = static_cast<float>(middle_y - y);
+    const float reach = range_max + radius;
+    const int in_range = dx * dx + dy * dy > reach * reach ? 0 : 1;
     const auto partlyLeftOf = [&](float ray_x, float ray_y) {
-      const float half = std::abs(ray_x * b.along_y - ray_y * b.along_x);
-      return ray_x * dy - ray_y * dx + half + b.thickness >= 0.0F;
+      const float half = std::abs(ray_x * along_y - ray_y * along_x);
+      return ray_x * dy - ray_y * dx + half + thickness >= 0.0F ? 1 : 0;
     };
-    const bool left_of_first = partlyLeftOf(right.x(), right.y());
-    const bool right_of_last = partlyLeftOf(-left.x(), -left.y());
-    return wide ? left_of_first || right_of_last : left_of_first && right_of_last;
+    const int left_of_first = partlyLeftOf(right.x(), right.y());
+    const int right_of_last = partlyLeftOf(-left.x(), -left.y());
+    return in_range & (wide ? left_of_first | right_of_last : left_of_first & right_of_last);
   }
 };
 
@@ -234,9 +272,13 @@ View RayCaster::Impl::view(const Pose& sensor, int first, int last, float* inver
 void RayCaster::Impl::castList(const ChunkList& list, const View& view) const {
   for (std::size_t group = 0; group < list.groups.size(); ++group) {
     if (!view.mayMeet(list.groups[group])) continue;
-    const std::size_t last = std::min((group + 1) * kGroup, list.bounds.size());
-    for (std::size_t i = group * kGroup; i < last; ++i) {
-      if (view.mayMeet(list.bounds[i])) castChunk(&list.x[i * kVertices], &list.y[i * kVertices], view);
+    alignas(32) int meets[kGroup];
+    view.mayMeet(list.grouped[group], meets);
+    const std::size_t first = group * kGroup;
+    const std::size_t count = std::min(kGroup, list.bounds.size() - first);
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t vertices = (first + i) * kVertices;
+      if (meets[i] != 0) castChunk(&list.x[vertices], &list.y[vertices], view);
     }
   }
 }

@@ -145,16 +145,17 @@ Path reversedLine(const Path& line) {
 
 World loadTunnel(Node& node, const WorldOptions& options, bool random) {
   TunnelPlan plan;
+  TunnelWalls walls;
   readCommon(node, options, plan);
   if (random) {
-    drawRandomTunnel(node, plan);
+    walls = drawRandomTunnel(node, plan);
   } else {
     plan.closed = node.boolean("closed");
     plan.pieces = readDesignLine(node, plan.closed);
     plan.separation = kTunnelSeparation;
     readDetails(node, plan);
+    walls = buildWalls(plan);
   }
-  TunnelWalls walls = buildWalls(plan);
   if (!walls.conflict.empty()) node.refuse("design_line", walls.conflict);
   World world;
   world.walls = std::move(walls.chains);

@@ -16,12 +16,12 @@ std::vector<geometry::Point> box(const geometry::Pose& pose, double length, doub
 }
 
 TEST(ClearanceMeter, DistanceOfAnOutlineToAWall) {
-  const ClearanceMeter meter({{{0.0, 5.0}, {100.0, 5.0}}});
+  ClearanceMeter meter({{{0.0, 5.0}, {100.0, 5.0}}});
   EXPECT_DOUBLE_EQ(meter.clearance(box({50.0, 1.0, 0.0}, 6.0, 3.0)), 2.5);
 }
 
 TEST(ClearanceMeter, ACornerOfTheWallCountsAsWell) {
-  const ClearanceMeter meter({{{10.0, 10.0}, {5.0, 0.0}, {10.0, -10.0}}});
+  ClearanceMeter meter({{{10.0, 10.0}, {5.0, 0.0}, {10.0, -10.0}}});
   EXPECT_DOUBLE_EQ(meter.clearance(box({0.0, 0.0, 0.0}, 6.0, 3.0)), 2.0);
 }
 
@@ -37,7 +37,7 @@ TEST(ClearanceMeter, AgreesWithTheWorldsExhaustiveSearch) {
     walls[0].emplace_back(0.5 * i, 3.0 + 0.3 * random.normal());
     walls[1].emplace_back(0.5 * i, -3.0 + 0.3 * random.normal());
   }
-  const ClearanceMeter meter(walls);
+  ClearanceMeter meter(walls);
   for (int i = 0; i < 500; ++i) {
     const auto outline = box(
         {random.uniform(0.0, 200.0), random.uniform(-2.5, 2.5), random.uniform(-3.0, 3.0)}, 6.0, 3.0);

@@ -81,6 +81,9 @@ class PreviewPlanner {
   using Vector = Eigen::Vector4d;  ///< (offset, heading error, articulation, command)
   struct Linear;                   ///< derivatives of one step
 
+  /// The same for who has the cosine of the heading error already.
+  PathState advance(const PathState& state, double cos_heading_error, double command_rate, double speed,
+                    double curvature, const YawResponse& believed, double step) const;
   void shift(double elapsed);
   /// Follows the plan from `now`; with a `correction` above 0, first changes it by that share of the
   /// last sweep's corrections. Returns the cost.

@@ -118,7 +118,7 @@ class Simulator {
   geometry::Pose poseAt(Stamp stamp) const;
   geometry::Pose sensorPose(const geometry::Pose& body) const;
   std::vector<world::WallChain> obstaclesAt(Stamp stamp) const;
-  double clearanceOf(const std::vector<geometry::Point>& outline) const;
+  double clearanceOf(const std::vector<geometry::Point>& outline);
 
   SimulatorParameters parameters_;
   vehicle::TruckParameters truck_;
@@ -135,6 +135,7 @@ class Simulator {
   Stamp step_;
   Stamp truth_period_;
   Stamp sensor_period_;
+  Stamp sweep_duration_;
   Stamp now_{};
   Stamp next_truth_{};
   Stamp next_sensors_{};
@@ -145,6 +146,7 @@ class Simulator {
   bool lidar_alive_ = true;
   bool sweeping_ = false;
   std::int64_t sweeps_ = 0;  ///< begun so far
+  Stamp next_sweep_{};
   Stamp sweep_stamp_{};
   geometry::Pose sweep_start_;
   Truth sweep_truth_;

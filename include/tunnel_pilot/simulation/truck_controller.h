@@ -115,6 +115,8 @@ class TruckController {
   void sendFrames(const SensedTruck& truck, Stamp now);
 
   TruckControllerParameters parameters_;
+  Stamp frame_period_;
+  Stamp command_timeout_;
   can::Bus& bus_;
   OperatorInputs operator_;
   std::uint16_t injected_faults_ = 0;

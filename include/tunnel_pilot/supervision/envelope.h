@@ -85,8 +85,12 @@ class Envelope {
     double s, lateral;
   };
   struct Posture {
-    geometry::Pose front;
+    geometry::Frame front;
     double articulation;
+  };
+  struct OutlinePoint {
+    double along;           ///< its own body's axle, forward [m]
+    double stations_ahead;  ///< of the front axle's station, truck straight
   };
   struct Remembered {
     geometry::Point point;  ///< odom
@@ -109,7 +113,7 @@ class Envelope {
   void layWallPiece(const Beside& a, const Beside& b, bool left);
   void endFreeSpace(double s, End why);
   Beside beside(const geometry::Point& point, std::size_t near) const;
-  void addStation(const geometry::Point& point, double heading, double s);
+  void addStation(const geometry::Point& point, const geometry::Point& direction, double s);
 
   EnvelopeParameters parameters_;
   CommandLimiterParameters limits_;
@@ -118,10 +122,12 @@ class Envelope {
   std::vector<Station> stations_;
   static constexpr std::size_t kFrontOutline = 3;  ///< nose, front axle, hinge
   static constexpr std::size_t kOutline = 7;       ///< hinge, middle, rear axle, tail
-  std::array<Beside, 2 * kOutline> outline_{};     ///< of the last posture, left side first
-  std::vector<Posture> postures_;                  ///< along the way ahead
-  std::size_t front_axle_ = 0;                     ///< station of the front axle now
-  double wall_end_ = 0.0;                          ///< farthest station with a wall [m]
+  std::array<OutlinePoint, kOutline> outline_{};
+  std::array<Beside, 2 * kOutline> swept_{};  ///< the last posture's outline, left side first
+  std::vector<Posture> postures_;             ///< along the way ahead
+  std::size_t front_axle_ = 0;                ///< station of the front axle now
+  double wall_end_ = 0.0;                     ///< farthest station with a wall [m]
+  double path_ahead_ = 0.0;                   ///< of the centerline, from the front axle on [m]
   std::array<Remembered, 64> memory_{};
   std::size_t remembered_ = 0;  ///< number ever remembered
   geometry::Point last_remembered_at_{0.0, 0.0};

@@ -21,7 +21,8 @@ double steadyArticulation(const TruckGeometry& truck, double curvature);
 /// d(gamma)/ds = [kappa (l_f cos(gamma) + l_r) - sin(gamma)] / l_r [rad/m].
 double articulationSlope(const TruckGeometry& truck, double curvature, double articulation);
 
-/// Pose of the rear body's frame (middle of the rear axle, rear heading).
+/// The rear body's frame (middle of the rear axle, rear heading).
+geometry::Frame rearFrame(const TruckGeometry& truck, const geometry::Frame& front, double articulation);
 geometry::Pose rearPose(const TruckGeometry& truck, const geometry::Pose& front, double articulation);
 
 /// Outline of the front and the rear body as closed polygons, counter-clockwise, in the frame that

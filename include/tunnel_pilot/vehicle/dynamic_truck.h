@@ -67,6 +67,12 @@ class DynamicTruck : public Plant {
     double front_x, front_y;  // of the front axle, in the front body's frame [m/s]
     double rear_x, rear_y;    // of the rear axle, in the rear body's frame [m/s]
   };
+  // What the equations of motion need of the masses; moments about the hinge.
+  struct Inertia {
+    double mass;                       // of both bodies [kg]
+    double front_moment, rear_moment;  // m_f c_f, m_r c_r [kg m]
+    double front, rear;                // the hinge's acceleration eliminated [kg m^2]
+  };
   // Resultant of one axle's tyres, in its body's frame [N].
   struct AxleForce {
     double x, y;
@@ -87,6 +93,7 @@ class DynamicTruck : public Plant {
 
   TruckParameters parameters_;
   TruckMasses masses_;
+  Inertia inertia_;
   HingeCompliance compliance_;
   HydraulicActuator actuator_;
   DriveTrain drive_train_;
