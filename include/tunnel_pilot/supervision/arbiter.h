@@ -97,6 +97,8 @@ class Arbiter {
  public:
   Arbiter(const ArbiterParameters& parameters, const vehicle::TruckParameters& truck);
 
+  const ArbiterParameters& parameters() const { return parameters_; }
+
   void setProposal(Source source, const drivers::Proposal& proposal, Stamp now);
   void setWalls(const perception::Walls& walls, Stamp now);
   void setTunnel(const perception::Tunnel& tunnel, Stamp now);
