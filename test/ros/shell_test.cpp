@@ -10,6 +10,7 @@
 #include "tunnel_pilot/ros/conversions.h"
 #include "tunnel_pilot/ros/motion_input.h"
 #include "tunnel_pilot/ros/parameters.h"
+#include "tunnel_pilot/ros/publisher_watch.h"
 #include "tunnel_pilot/ros/sensor_pose.h"
 
 namespace tunnel_pilot::shell {
@@ -221,6 +222,16 @@ nav_msgs::Odometry odometry(double stamp, double speed) {
   message.pose.pose.orientation.w = 1.0;
   message.twist.twist.linear.x = speed;
   return message;
+}
+
+TEST(PublisherWatch, NoticesASecondNodeUntilItIsSilent) {
+  PublisherWatch watch;
+  EXPECT_TRUE(watch.alone("/lidar", ros::SteadyTime(1.0)));
+  EXPECT_TRUE(watch.alone("/lidar", ros::SteadyTime(1.1)));
+  EXPECT_FALSE(watch.alone("/rogue", ros::SteadyTime(1.2)));
+  EXPECT_FALSE(watch.alone("/lidar", ros::SteadyTime(1.3)));
+  EXPECT_FALSE(watch.alone("/lidar", ros::SteadyTime(2.1)));
+  EXPECT_TRUE(watch.alone("/lidar", ros::SteadyTime(2.3)));
 }
 
 TEST(MotionInput, SaysNothingUntilBothTopicsSpoke) {
