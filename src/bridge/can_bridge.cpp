@@ -94,17 +94,17 @@ std::uint32_t CanBridge::monotonous(std::uint32_t sequence) {
   return sequence + sequence_offset_;
 }
 
+void CanBridge::rejectCommand(const Command& command, const std::string& why, Stamp now) {
+  ++status_.commands_rejected;
+  status_.command_rejection = why;
+  if (!command.stop) return;
+  raise(Event::kCommandStop, now);
+  sendIfDue(now);
+}
+
 void CanBridge::setCommand(const Command& command, Stamp now) {
   const std::string why = whyRefused(command, now);
-  if (!why.empty()) {
-    ++status_.commands_rejected;
-    status_.command_rejection = why;
-    if (command.stop) {
-      raise(Event::kCommandStop, now);
-      sendIfDue(now);
-    }
-    return;
-  }
+  if (!why.empty()) return rejectCommand(command, why, now);
   const std::uint32_t sequence = monotonous(command.sequence);  // compares with the command before
   command_ = Received{command, now};
   command_->command.sequence = sequence;

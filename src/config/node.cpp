@@ -1,5 +1,7 @@
 #include "tunnel_pilot/config/node.h"
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -24,6 +26,15 @@ std::string range(const std::string& unit, double min, double max) {
   return "[" + unit + "] in " + interval(min, max);
 }
 
+// Whatever a file holds, a message stays one line.
+std::string oneLine(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return std::iscntrl(c) != 0; }, ' ');
+  return text;
+}
+
+std::string keyOf(const YAML::Node& key) { return key.IsScalar() ? key.Scalar() : "(not a scalar)"; }
+
 std::string flowText(const YAML::Node& value) {
   YAML::Emitter out;
   out << YAML::Flow << value;
@@ -41,6 +52,11 @@ Node::Node(const YAML::Node& yaml, std::string source, std::string path)
     throw ConfigError(source_ + ": " + (path_.empty() ? "the file" : "'" + path_ + "'") +
                       " must be a map of keys");
   }
+  std::set<std::string> keys;
+  for (const auto& entry : yaml_) {
+    const std::string key = keyOf(entry.first);
+    if (!keys.insert(key).second) refuse(key, "stands twice");
+  }
 }
 
 Node::Node(const YAML::Node& yaml, const Node& parent, std::string path)
@@ -56,7 +72,7 @@ void Node::record(const std::string& key, const std::string& unit, const std::st
 std::string Node::name(const std::string& key) const { return path_.empty() ? key : path_ + "." + key; }
 
 void Node::refuse(const std::string& key, const std::string& why) const {
-  throw ConfigError(source_ + ": '" + name(key) + "' " + why);
+  throw ConfigError(oneLine(source_ + ": '" + name(key) + "' " + why));
 }
 
 bool Node::has(const std::string& key) const {
@@ -157,7 +173,7 @@ std::vector<Node> Node::children(const std::string& key) {
 
 void Node::finish() const {
   for (const auto& entry : yaml_) {
-    const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "(not a scalar)";
+    const std::string key = keyOf(entry.first);
     if (read_.count(key) == 0) refuse(key, "is unknown");
   }
 }

@@ -25,6 +25,8 @@ ArbiterRos::ArbiterRos(ros::NodeHandle nh, ros::NodeHandle private_nh)
       command_publisher_(nh.advertise<TruckCommand>("command", 1)),
       state_publisher_(nh.advertise<ArbiterState>("arbiter_state", 1)),
       diagnostics_(nh, private_nh, "arbiter", [this](auto& status) { fillStatus(status); }) {
+  last_.command.stop = true;
+  last_.command.reason = supervision::Reason::kStartUp;
   subscribe(nh);
   stop_service_ = private_nh.advertiseService("stop", &ArbiterRos::onStop, this);
   reset_service_ = private_nh.advertiseService("reset", &ArbiterRos::onReset, this);
@@ -39,7 +41,8 @@ ArbiterRos::ArbiterRos(ros::NodeHandle nh, ros::NodeHandle private_nh)
 template <class Message, class Callback>
 void ArbiterRos::listen(ros::NodeHandle& nh, const std::string& topic, Callback callback) {
   const boost::function<void(const boost::shared_ptr<const Message>&)> call =
-      [this, callback](const boost::shared_ptr<const Message>& message) {
+      [this, topic, callback](const boost::shared_ptr<const Message>& message) {
+        unheard_.erase(topic);
         nowAfter(message->header.stamp);
         checkClock();
         callback(*message);
@@ -50,6 +53,8 @@ void ArbiterRos::listen(ros::NodeHandle& nh, const std::string& topic, Callback 
 
 void ArbiterRos::subscribe(ros::NodeHandle& nh) {
   using supervision::Source;
+  unheard_ = {"points", "walls", "tunnel_state", "centerline", "odom", "joint_states"};
+  if (arbiter_.parameters().needs_truck_state) unheard_.insert("truck_status");
   for (const auto& [topic, source] : {std::pair("lidar_driver/proposal", Source::kLidarDriver),
                                       std::pair("preview_driver/proposal", Source::kPreviewDriver),
                                       std::pair("teleoperation/proposal", Source::kTeleoperation)}) {
@@ -115,7 +120,12 @@ bool ArbiterRos::onReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Respons
 }
 
 void ArbiterRos::updateMotion() {
-  if (const auto motion = motion_.motion()) arbiter_.setMotion(*motion, now());
+  const auto motion = motion_.motion();
+  if (!motion) return;
+  arbiter_.setMotion(*motion, now());
+  if (drivers::isFinite(*motion)) return;
+  ++motion_refused_;
+  ROS_ERROR_THROTTLE(1.0, "arbiter: odom or joint_states holds a number that is not finite");
 }
 
 void ArbiterRos::updateTunnel() {
@@ -128,9 +138,18 @@ void ArbiterRos::decide() {
   last_ = arbiter_.decide(now());
   command_publisher_.publish(boost::make_shared<TruckCommand>(toRos(last_.command)));
   state_publisher_.publish(boost::make_shared<ArbiterState>(toArbiterState(last_)));
+  if (last_.command.reason == supervision::Reason::kStartUp && !unheard_.empty()) {
+    ROS_WARN_THROTTLE(5.0, "arbiter: waiting for the first message on: %s", unheardTopics().c_str());
+  }
   if (last_.command.reason == previous) return;
   ROS_INFO("arbiter: %s", toString(last_.command.reason).c_str());
   diagnostics_.tell();
+}
+
+std::string ArbiterRos::unheardTopics() const {
+  std::string list;
+  for (const std::string& topic : unheard_) list += (list.empty() ? "" : ", ") + topic;
+  return list;
 }
 
 void ArbiterRos::fillStatus(Diagnostics::Status& status) const {
@@ -144,6 +163,8 @@ void ArbiterRos::fillStatus(Diagnostics::Status& status) const {
   status.add("speed [m/s]", command.speed);
   status.add("stop", command.stop);
   status.add("sequence", command.sequence);
+  status.add("motion not finite", motion_refused_);
+  if (!unheard_.empty()) status.add("nothing heard yet on", unheardTopics());
 }
 
 }  // namespace tunnel_pilot::shell

@@ -55,7 +55,14 @@ void CanBridgeRos::advertiseEdge(ros::NodeHandle& nh, const std::string& name, E
       name, boost::function<bool(Trigger::Request&, Trigger::Response&)>(serve)));
 }
 
-void CanBridgeRos::onCommand(const TruckCommand& message) {
+void CanBridgeRos::onCommand(const CommandEvent& event) {
+  const TruckCommand& message = *event.getConstMessage();
+  if (!publishers_.alone(event.getPublisherName(), ros::SteadyTime::now())) {
+    ROS_ERROR_THROTTLE(1.0, "can_bridge: command rejected: more than one node publishes it, %s is one",
+                       event.getPublisherName().c_str());
+    bridge_->rejectCommand(toCore(message), "more than one node publishes it", current());
+    return;
+  }
   bridge_->setCommand(toCore(message), current());
 }
 

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "tunnel_pilot/drivers/motion_history.h"
 #include "tunnel_pilot/ros/conversions.h"
 
 namespace tunnel_pilot::shell {
@@ -18,16 +17,13 @@ void MotionInput::setJointState(const sensor_msgs::JointState& message) {
   joint.angle = message.position[index];
   if (index < message.velocity.size()) {
     joint.rate = message.velocity[index];
-  } else if (joint_ && joint.stamp > joint_->stamp) {
+  } else if (joint_ && joint.stamp > joint_->stamp && std::isfinite(joint_->angle)) {
     joint.rate = (joint.angle - joint_->angle) / toSeconds(joint.stamp - joint_->stamp);
   }
-  if (std::isfinite(joint.angle) && std::isfinite(joint.rate)) joint_ = joint;
+  joint_ = joint;
 }
 
-void MotionInput::setOdometry(const nav_msgs::Odometry& message) {
-  const drivers::Motion motion = toMotion(message);
-  if (drivers::isFinite(motion)) odometry_ = motion;
-}
+void MotionInput::setOdometry(const nav_msgs::Odometry& message) { odometry_ = toMotion(message); }
 
 void MotionInput::reset() {
   joint_.reset();

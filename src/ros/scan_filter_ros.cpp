@@ -19,11 +19,19 @@ ScanFilterRos::ScanFilterRos(ros::NodeHandle nh, ros::NodeHandle private_nh)
           nh.subscribe("scan", 1, &ScanFilterRos::onScan, this, ros::TransportHints().tcpNoDelay())),
       diagnostics_(nh, private_nh, "scan_filter", [this](auto& status) { fillStatus(status); }) {}
 
-void ScanFilterRos::onScan(const sensor_msgs::LaserScan& message) {
+void ScanFilterRos::onScan(const ScanEvent& event) {
+  const sensor_msgs::LaserScan& message = *event.getConstMessage();
   const Stamp received = nowAfter(message.header.stamp);
   if (clock_.jumped()) {
     ROS_WARN("scan_filter: the clock jumped, starting anew");
     filter_.reset();
+  }
+  if (!publishers_.alone(event.getPublisherName(), ros::SteadyTime::now())) {
+    ++foreign_;
+    problem_ = "scan rejected: more than one node publishes it";
+    ROS_ERROR_THROTTLE(1.0, "scan_filter: %s: %s is one", problem_.c_str(),
+                       event.getPublisherName().c_str());
+    return;
   }
   const auto sensor = sensor_pose_.find(message.header.frame_id);
   if (!sensor) {
@@ -56,7 +64,8 @@ void ScanFilterRos::fillStatus(Diagnostics::Status& status) const {
     status.summary(Diagnostics::Status::ERROR, problem_);
   }
   status.add("accepted", filter_.accepted());
-  status.add("rejected", filter_.rejected());
+  status.add("rejected", filter_.rejected() + foreign_);
+  if (foreign_ > 0) status.add("from more than one node", foreign_);
   for (std::size_t i = 1; i < ScanFilter::kRejections; ++i) {
     const auto rejection = static_cast<ScanFilter::Rejection>(i);
     if (filter_.count(rejection) > 0) status.add(toString(rejection), filter_.count(rejection));

@@ -16,7 +16,13 @@ class Drive : public ClosedLoop {
         bool reversed)
       : ClosedLoop(scenario, setup, withTopSpeed(setup.pilot, drive.top_speed),
                    world::loadWorld(drive.world_file, {seed, reversed}), seed),
-        drive_(drive) {}
+        drive_(drive) {
+    const double length = simulator_.world().design_line.length();
+    if (drive.station <= length) return;
+    throw config::ConfigError(scenario.file + ": 'experiment.station' [m] lies beyond the end of the " +
+                              "design line of " + drive.world_file + " at " + std::to_string(length) +
+                              " m");
+  }
 
   EpisodeResult run() {
     EpisodeResult result;

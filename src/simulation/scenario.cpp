@@ -27,11 +27,14 @@ PlantChoice loadPlant(config::Node node) {
 }
 
 // A file or folder named in a scenario stands relative to it.
-std::string besideScenario(config::Node& node, const std::string& key,
-                           const std::filesystem::path& base) {
+std::string besideScenario(config::Node& node, const std::string& key, const std::filesystem::path& base,
+                           bool folder = false) {
   const std::filesystem::path path = (base / node.text(key)).lexically_normal();
-  if (!std::filesystem::exists(path))
-    node.refuse(key, "names '" + path.string() + "', which does not exist");
+  std::error_code error;
+  const bool there = folder ? std::filesystem::is_directory(path, error)
+                            : std::filesystem::is_regular_file(path, error);
+  if (!there)
+    node.refuse(key, "names '" + path.string() + "', which is no " + (folder ? "folder" : "file"));
   return path.string();
 }
 
@@ -157,7 +160,7 @@ Scenario loadScenario(const std::string& file) {
   const std::string stem = std::filesystem::path(file).stem().string();
   if (scenario.name != stem) node.refuse("name", "must be that of the file, '" + stem + "'");
   scenario.title = node.text("title");
-  scenario.config_folder = besideScenario(node, "config", base);
+  scenario.config_folder = besideScenario(node, "config", base, true);
   scenario.first_seed = static_cast<std::uint64_t>(node.integer("first_seed", "1", 0, 1'000'000'000));
   scenario.seeds = static_cast<int>(node.integer("seeds", "1", 1, 100'000));
   scenario.plant = loadPlant(node.child("plant"));

@@ -59,6 +59,7 @@ void Arbiter::setProposal(Source source, const drivers::Proposal& proposal, Stam
 void Arbiter::setWalls(const perception::Walls& walls, Stamp) { walls_ = walls; }
 
 void Arbiter::takeScan(Stamp stamp, Stamp now) {
+  if (age(scan_received_, now) > parameters_.scan_degraded_age) gap_ended_ = now;
   points_stamp_ = stamp;
   scan_received_ = now;
 }
@@ -110,6 +111,7 @@ void Arbiter::clockJumped() {
   history_.clear();
   envelope_.reset();
   scan_received_.reset();
+  gap_ended_.reset();
   tunnel_received_.reset();
   tunnel_valid_received_.reset();
   motion_received_.reset();
@@ -195,11 +197,17 @@ void Arbiter::assessTruck(Stamp now, Findings& findings) const {
   }
 }
 
+// A scan is late, or came late and has still to become this source's proposal.
+bool Arbiter::waitsForScan(const SourceRule& rule, Stamp now) const {
+  if (age(scan_received_, now) > parameters_.scan_degraded_age) return true;
+  const Stamp measured = slots_[static_cast<std::size_t>(rule.source)].proposal.stamp;
+  return age(gap_ended_, now) <= rule.max_age && toSeconds(now - measured) <= parameters_.scan_stop_age;
+}
+
 // Without a healthy source the truck stops, unless what the sources lack is about to be judged by
 // itself: a late scan or an invalid tunnel, each with its own grace.
 void Arbiter::assessSources(Stamp now, Findings& findings) const {
   if (bestSource(now)) return;
-  const bool scan_late = age(scan_received_, now) > parameters_.scan_degraded_age;
   const bool tunnel_lost = tunnel_received_ && !tunnel_state_.valid;
   Findings causes;
   bool excused = false;
@@ -214,7 +222,7 @@ void Arbiter::assessSources(Stamp now, Findings& findings) const {
         break;
       case Health::kStale:
         causes.stopFor(Reason::kSourceStale);
-        excused = excused || scan_late;
+        excused = excused || waitsForScan(rule, now);
         break;
       case Health::kUnable:
         causes.stopFor(Reason::kNoSource);

@@ -4,12 +4,15 @@
 #include <rosbag/view.h>
 #include <sensor_msgs/LaserScan.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <boost/program_options.hpp>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <filesystem>
 #include <fstream>
@@ -28,6 +31,8 @@ namespace options = boost::program_options;
 using namespace tunnel_pilot;
 
 constexpr const char* kOdometryTopic = "/odom";
+constexpr int kDone = 0;
+constexpr int kBadInput = 2;
 constexpr rlim_t kMemoryLimit = rlim_t{4} << 30;  // a bag's own sizes are not to be trusted [bytes]
 
 struct Arguments {
@@ -68,7 +73,10 @@ bool parse(int argc, char** argv, Arguments& arguments) {
     return false;
   }
   options::notify(values);
-  if (arguments.transform.size() != 3) throw options::error("--transform needs three numbers: x y yaw");
+  const auto& transform = arguments.transform;
+  if (transform.size() != 3 || !std::isfinite(transform[0] + transform[1] + transform[2])) {
+    throw options::error("--transform needs three numbers: x y yaw");
+  }
   return true;
 }
 
@@ -218,6 +226,10 @@ void readBag(const Arguments& arguments, Perceiver& perceiver) {
 
 void perceive(const Arguments& arguments) {
   if (!std::filesystem::is_regular_file(arguments.bag)) throw std::runtime_error("no such file");
+  std::error_code other;
+  if (std::filesystem::equivalent(arguments.bag, arguments.csv, other)) {
+    throw std::runtime_error("the bag itself is named as --csv");
+  }
   simulation::PerceptionParameters parameters =
       simulation::loadPerception(parameterFiles(arguments.config));
   parameters.scan_filter.check_age = false;  // a recording is as old as it is
@@ -233,19 +245,40 @@ void perceive(const Arguments& arguments) {
   }
 }
 
+int run(const Arguments& arguments) {
+  try {
+    perceive(arguments);
+    return kDone;
+  } catch (const std::exception& error) {
+    std::cerr << "perceive: " << arguments.bag << ": " << error.what() << "\n";
+    return kBadInput;
+  }
+}
+
+// A damaged bag can end the process inside the bag library (assertions, reads out of bounds): a process
+// of its own reads it, so that this one can tell.
+int runGuarded(const Arguments& arguments) {
+  const pid_t child = fork();
+  if (child == 0) _exit(run(arguments));
+  int state = 0;
+  if (child < 0 || waitpid(child, &state, 0) != child)
+    throw std::runtime_error("cannot start a process");
+  if (WIFEXITED(state)) return WEXITSTATUS(state);
+  std::cerr << "perceive: " << arguments.bag << ": the bag is damaged: reading it ended with '"
+            << strsignal(WTERMSIG(state)) << "'\n";
+  return kBadInput;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   const rlimit limit{kMemoryLimit, kMemoryLimit};
   setrlimit(RLIMIT_AS, &limit);
-  Arguments arguments;
   try {
-    if (!parse(argc, argv, arguments)) return 0;
-    perceive(arguments);
-    return 0;
+    Arguments arguments;
+    return parse(argc, argv, arguments) ? runGuarded(arguments) : kDone;
   } catch (const std::exception& error) {
-    std::cerr << "perceive: " << (arguments.bag.empty() ? "" : arguments.bag + ": ") << error.what()
-              << "\n";
-    return 2;
+    std::cerr << "perceive: " << error.what() << "\n";
+    return kBadInput;
   }
 }

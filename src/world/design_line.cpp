@@ -13,7 +13,9 @@ namespace {
 using config::Node;
 using geometry::PathPiece;
 
-constexpr double kMaxLength = 2000.0;       // of one piece [m]
+constexpr double kMaxLength = 2000.0;   // of one piece [m]
+constexpr double kMaxLineLength = 1e5;  // [m]
+constexpr std::size_t kMaxPieces = 1000;
 constexpr double kMinRadius = 3.0;          // [m]
 constexpr double kMaxRadius = 10000.0;      // [m]
 constexpr double kMaxAngle = 2.0 * M_PI;    // of one arc [rad]
@@ -199,8 +201,18 @@ void checkClosure(const Node& world, const std::vector<PathPiece>& path) {
 
 std::vector<PathPiece> readDesignLine(Node& world, bool closed) {
   std::vector<Piece> pieces;
-  for (const Node& node : world.children(kKey)) readPiece(node, closed, pieces);
+  const std::vector<Node> nodes = world.children(kKey);
+  if (nodes.size() > kMaxPieces) {
+    world.refuse(kKey, "must hold at most " + std::to_string(kMaxPieces) + " pieces");
+  }
+  for (const Node& node : nodes) readPiece(node, closed, pieces);
   if (pieces.empty()) world.refuse(kKey, "must hold at least one piece");
+  double length = 0.0;
+  for (const Piece& piece : pieces) length += piece.length;
+  if (length > kMaxLineLength) {
+    world.refuse(kKey,
+                 "is " + format(length) + " m long, must be at most " + format(kMaxLineLength) + " m");
+  }
   if (closed) {
     closeHeading(world, pieces);
     closePosition(world, pieces);

@@ -9,7 +9,8 @@ namespace tunnel_pilot::world {
 namespace {
 
 constexpr std::uintmax_t kMaxImageBytes = 256u << 20;
-constexpr int kMaxSide = 16384;  // [cells]
+constexpr int kMaxSide = 16384;              // [cells]
+constexpr std::int64_t kMaxEdges = 500'000;  // between occupied and free cells, along the rows
 
 struct MapHeader {
   std::string image;
@@ -71,6 +72,16 @@ cv::Mat occupiedCells(const cv::Mat& image, const MapHeader& header) {
   return occupied;
 }
 
+// Noise has walls everywhere: their outlines would not fit into memory.
+std::int64_t edgesIn(const cv::Mat& occupied) {
+  std::int64_t edges = 0;
+  for (int row = 0; row < occupied.rows; ++row) {
+    const auto* cells = occupied.ptr<std::uint8_t>(row);
+    for (int column = 1; column < occupied.cols; ++column) edges += cells[column] != cells[column - 1];
+  }
+  return edges;
+}
+
 // A contour of one cell is a point, so the cell's own outline stands for it.
 std::vector<cv::Point2d> outlineOf(const std::vector<cv::Point>& contour) {
   std::vector<cv::Point> corners;
@@ -90,8 +101,13 @@ std::vector<WallChain> loadOccupancyMap(const std::string& file) {
   config::Node node = config::loadFile(file);
   const MapHeader header = readHeader(node);
   const cv::Mat image = readImage(node, header);
+  const cv::Mat occupied = occupiedCells(image, header);
+  if (edgesIn(occupied) > kMaxEdges) {
+    node.refuse("image", "= '" + header.image + "' is no map but noise: more than " +
+                             std::to_string(kMaxEdges) + " edges between occupied and free cells");
+  }
   std::vector<std::vector<cv::Point>> contours;
-  cv::findContours(occupiedCells(image, header), contours, cv::RETR_LIST, cv::CHAIN_APPROX_NONE);
+  cv::findContours(occupied, contours, cv::RETR_LIST, cv::CHAIN_APPROX_NONE);
   std::vector<WallChain> walls;
   for (const std::vector<cv::Point>& contour : contours) {
     WallChain chain;

@@ -12,7 +12,8 @@ using geometry::PathPoint;
 using geometry::Point;
 
 constexpr double kFoldLimit = 0.9;  // curvature times wall offset; at 1 the inner wall would be a point
-constexpr double kCornerSmoothing = 1.0;  // roughness fades out towards an opening's corners [m]
+constexpr double kMaxWallPoints = 20000.0;  // of one wall: each is compared with each
+constexpr double kCornerSmoothing = 1.0;    // roughness fades out towards an opening's corners [m]
 
 Point normalOf(const PathPoint& p) { return {-std::sin(p.heading), std::cos(p.heading)}; }
 Point positionOf(const PathPoint& p) { return {p.x, p.y}; }
@@ -164,6 +165,16 @@ double widthAt(const TunnelPlan& plan, double s) {
   return width;
 }
 
-TunnelWalls buildWalls(const TunnelPlan& plan) { return WallBuilder(plan).build(); }
+TunnelWalls buildWalls(const TunnelPlan& plan) {
+  double length = 0.0;
+  for (const geometry::PathPiece& piece : plan.pieces) length += piece.length;
+  if (length > kMaxWallPoints * plan.wall_spacing) {
+    std::ostringstream out;
+    out << "is " << length << " m long: more than " << kMaxWallPoints << " wall_spacings of "
+        << plan.wall_spacing << " m";
+    return {{}, out.str()};
+  }
+  return WallBuilder(plan).build();
+}
 
 }  // namespace tunnel_pilot::world

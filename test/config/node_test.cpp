@@ -1,9 +1,9 @@
-#include <functional>
-#include <string>
+#include "tunnel_pilot/config/node.h"
 
 #include <gtest/gtest.h>
 
-#include "tunnel_pilot/config/node.h"
+#include <functional>
+#include <string>
 
 namespace tunnel_pilot::config {
 namespace {
@@ -48,6 +48,19 @@ TEST(ConfigNode, UnknownKeyIsNamed) {
   Node node = parse("{a: 1, typo: 2}");
   node.number("a", "m", 0, 1);
   EXPECT_EQ(messageOf([&] { node.finish(); }), "truck.yaml: 'typo' is unknown");
+}
+
+TEST(ConfigNode, AKeyThatStandsTwiceIsNamed) {
+  EXPECT_EQ(messageOf([] { parse("{a: 1, b: 2, a: 3}"); }), "truck.yaml: 'a' stands twice");
+  Node node = parse("{steering: {lag: 1, lag: 2}}");
+  EXPECT_EQ(messageOf([&] { node.child("steering"); }), "truck.yaml: 'steering.lag' stands twice");
+}
+
+TEST(ConfigNode, AMessageIsOneLineWhateverTheFileHolds) {
+  Node node = parse("{a: \"x\\n\\e[31my\", \"b\\nc\": 1}");
+  EXPECT_EQ(messageOf([&] { node.choice("a", {"z"}); }),
+            "truck.yaml: 'a' = 'x  [31my' must be one of: z");
+  EXPECT_EQ(messageOf([&] { node.finish(); }), "truck.yaml: 'b c' is unknown");
 }
 
 TEST(ConfigNode, QuotedNumberNanAndTextAreNotNumbers) {

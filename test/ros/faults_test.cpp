@@ -167,6 +167,23 @@ TEST_F(FaultsTest, CommandsFromASecondPublisherThatAreNotFiniteDoNotReachTheTruc
   EXPECT_EQ(0u, truth.contacts);
 }
 
+// Finite, in range and numbered higher than the arbiter's, which would then be refused themselves.
+TEST_F(FaultsTest, ASecondPublisherOfCommandsIsNotObeyedAndStops) {
+  ros::Publisher rogue = nh_.advertise<TruckCommand>("command", 10);
+  ASSERT_TRUE(spinUntil([&] { return rogue.getNumSubscribers() > 0; }));
+  TruckCommand command;
+  command.sequence = 4'000'000'000u;
+  command.articulation_angle = 0.3;
+  command.speed = 5.0;
+  command.acceleration = 1.0;
+  EXPECT_TRUE(spinUntil([&] {
+    command.header.stamp = truth.header.stamp;
+    rogue.publish(command);
+    return status.state == TruckStatus::STATE_STOPPED;
+  })) << status.reason_text;
+  EXPECT_EQ(0u, truth.contacts);
+}
+
 TEST_F(FaultsTest, PausedSimulatorStandsStillAndGoesOnWithoutAStop) {
   std_srvs::SetBool pause;
   pause.request.data = true;

@@ -10,6 +10,7 @@
 #include "tunnel_pilot/ros/conversions.h"
 #include "tunnel_pilot/ros/motion_input.h"
 #include "tunnel_pilot/ros/parameters.h"
+#include "tunnel_pilot/ros/publisher_watch.h"
 #include "tunnel_pilot/ros/sensor_pose.h"
 #include "tunnel_pilot/ros/status_text.h"
 
@@ -224,6 +225,16 @@ nav_msgs::Odometry odometry(double stamp, double speed) {
   return message;
 }
 
+TEST(PublisherWatch, NoticesASecondNodeUntilItIsSilent) {
+  PublisherWatch watch;
+  EXPECT_TRUE(watch.alone("/lidar", ros::SteadyTime(1.0)));
+  EXPECT_TRUE(watch.alone("/lidar", ros::SteadyTime(1.1)));
+  EXPECT_FALSE(watch.alone("/rogue", ros::SteadyTime(1.2)));
+  EXPECT_FALSE(watch.alone("/lidar", ros::SteadyTime(1.3)));
+  EXPECT_FALSE(watch.alone("/lidar", ros::SteadyTime(2.1)));
+  EXPECT_TRUE(watch.alone("/lidar", ros::SteadyTime(2.3)));
+}
+
 TEST(MotionInput, SaysNothingUntilBothTopicsSpoke) {
   MotionInput input;
   input.setOdometry(odometry(1.0, 2.0));
@@ -249,15 +260,19 @@ TEST(MotionInput, MeasuresARateThatIsNotTold) {
   EXPECT_NEAR(0.1, input.motion()->articulation_rate, 1e-6);
 }
 
-TEST(MotionInput, PassesOverNumbersThatAreNone) {
+TEST(MotionInput, PassesOnNumbersThatAreNoneAndRecovers) {
   MotionInput input;
   input.setOdometry(odometry(1.0, 2.0));
   input.setJointState(jointState(1.0, 0.2));
   input.setOdometry(odometry(2.0, kNan));
-  input.setJointState(jointState(2.0, kNan));
-  EXPECT_EQ(2.0, input.motion()->speed);
-  EXPECT_EQ(0.2, input.motion()->articulation);
-  EXPECT_EQ(std::chrono::seconds(1), input.motion()->stamp);
+  EXPECT_FALSE(drivers::isFinite(*input.motion()));
+  input.setOdometry(odometry(3.0, 2.0));
+  EXPECT_TRUE(drivers::isFinite(*input.motion()));
+  input.setJointState(jointState(3.0, kNan));
+  EXPECT_FALSE(drivers::isFinite(*input.motion()));
+  input.setJointState(jointState(4.0, 0.3));
+  EXPECT_TRUE(drivers::isFinite(*input.motion()));
+  EXPECT_EQ(0.3, input.motion()->articulation);
 }
 
 TEST(TunnelInput, BringsTogetherWhatHasOneStamp) {

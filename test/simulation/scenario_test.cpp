@@ -1,6 +1,7 @@
 #include "tunnel_pilot/simulation/scenario.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cmath>
@@ -89,7 +90,8 @@ TEST_F(ScenarioFile, EveryFaultIsRefusedNamingFileAndKey) {
       {"name: probe", "name: other", "'name' must be that of the file"},
       {"name: probe\n", "", "'name' is missing"},
       {"title: A probe", "title: [A]", "'title'"},
-      {"config: config", "config: nowhere", "does not exist"},
+      {"config: config", "config: nowhere", "nowhere', which is no folder"},
+      {"config: config", "config: world.yaml", "world.yaml', which is no folder"},
       {"config: config\n", "", "'config' is missing"},
       {"first_seed: 1", "first_seed: -1", "'first_seed'"},
       {"first_seed: 1", "first_seed: 1.5", "'first_seed'"},
@@ -121,6 +123,17 @@ TEST_F(ScenarioFile, EveryFaultIsRefusedNamingFileAndKey) {
     const std::string message = refusal(replaced(kGood, fault.what, fault.with));
     EXPECT_NE(message.find(fault.told), std::string::npos) << fault.with << " gave: " << message;
     EXPECT_NE(message.find("probe.yaml"), std::string::npos) << message;
+  }
+}
+
+// Reading a device or a pipe would never end.
+TEST_F(ScenarioFile, AWorldThatIsNoFileIsRefused) {
+  for (const char* world : {"nowhere.yaml", "/dev/zero", "config", "pipe"}) {
+    mkfifo((folder_ / "pipe").c_str(), 0600);
+    const std::string message =
+        refusal(replaced(kGood, "kind: lane_change", "kind: drive\n  world: " + std::string(world)));
+    EXPECT_NE(message.find("'experiment.world' names '"), std::string::npos) << message;
+    EXPECT_NE(message.find("which is no file"), std::string::npos) << message;
   }
 }
 

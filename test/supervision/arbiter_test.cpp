@@ -200,6 +200,31 @@ TEST(Arbiter, ScansMissingSlowDownAfterATenthAndStopAfterThreeTenthsOfASecond) {
   }
 }
 
+// Between a scan's points and the proposal that comes of them lie other decisions.
+TEST(Arbiter, AScanAfterAGapIsGivenTimeToBecomeAProposal) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.give_scan = bench.give_proposal = false;
+  EXPECT_TRUE(bench.cycles(10).degraded);
+  bench.give_scan = true;
+  const Decision& decision = bench.cycle();
+  EXPECT_FALSE(decision.command.stop) << toString(decision.command.reason);
+  bench.give_proposal = true;
+  EXPECT_FALSE(bench.cycles(60).degraded);
+  EXPECT_EQ(bench.cycle().command.reason, Reason::kNone);
+}
+
+TEST(Arbiter, AScanAfterAGapThatBecomesNoProposalStops) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.give_scan = bench.give_proposal = false;
+  bench.cycles(10);
+  bench.give_scan = true;
+  // The last proposal's measurement is 0.24 s old by now.
+  EXPECT_LE(secondsToStop(bench), 0.08);
+  EXPECT_EQ(bench.cycle().command.reason, Reason::kSourceStale);
+}
+
 TEST(Arbiter, AMeasurementOlderThanThreeTenthsOfASecondStopsByItsStamp) {
   ArbiterBench bench;
   bench.drive();

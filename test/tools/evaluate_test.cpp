@@ -81,8 +81,13 @@ TEST_F(Evaluate, SummaryIsJsonWithTheFingerprintsOfWhatWasRun) {
 
 TEST_F(Evaluate, BadInputExitsTwoAndSaysWhy) {
   const std::string good = scenario("{metric: completed, paper: '-', judge: every_seed, min: 1.0}");
+  std::string far = contentOf(good);
+  far.replace(far.find("name: short"), 11, "name: far");
+  far.replace(far.find("station: 20.0"), 13, "station: 300.0");
+  std::ofstream(place_.file("far.yaml")) << far;
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
       {{}, "scenario"},
+      {{place_.file("far.yaml")}, "far.yaml: 'experiment.station' [m] lies beyond the end"},
       {{"nowhere.yaml"}, "nowhere.yaml"},
       {{good, "--seeds", "0"}, "--seeds"},
       {{good, "--seeds", "many"}, "seeds"},

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -162,6 +163,9 @@ TEST_F(Perceive, BadInputExitsTwoAndSaysWhy) {
       {{"--bag", bag(), "--csv", csv(), "--config", place_.file("none")}, "none"},
       {{"--bag", bag(), "--csv", csv(), "--transform", "1.0"}, "transform"},
       {{"--bag", bag(), "--csv", csv(), "--transform", "a", "b", "c"}, "transform"},
+      {{"--bag", bag(), "--csv", csv(), "--transform", "nan", "0", "0"}, "transform"},
+      {{"--bag", bag(), "--csv", bag()}, "the bag itself"},
+      {{"--bag", bag(), "--csv", "/dev/full"}, "/dev/full"},
       {{"--bag", bag(), "--csv", csv(), "--colour", "red"}, "colour"},
   };
   for (const auto& [arguments, told] : cases) {
@@ -181,6 +185,20 @@ TEST_F(Perceive, ABagCutAnywhereIsRefusedOrReadButNeverCrashes) {
     EXPECT_EQ(outcome.signal, 0) << "cut to " << size;
     EXPECT_EQ(outcome.status, 2) << "cut to " << size << ": " << outcome.output;
   }
+}
+
+// Sizes of 4 GB in the index end the bag library by an assertion.
+TEST_F(Perceive, ABagThatEndsTheBagLibraryIsToldAsDamaged) {
+  std::string bad = contentOf(bag());
+  const std::string key = "index_pos=";
+  std::uint64_t index = 0;
+  std::memcpy(&index, bad.data() + bad.find(key) + key.size(), sizeof index);
+  std::fill_n(bad.begin() + static_cast<std::ptrdiff_t>(index), 64, '\xEE');
+  std::ofstream(place_.file("bad.bag"), std::ios::binary) << bad;
+  const Outcome outcome = perceive({"--bag", place_.file("bad.bag"), "--csv", csv()});
+  EXPECT_EQ(outcome.signal, 0);
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.output.find("bad.bag: the bag is damaged"), std::string::npos) << outcome.output;
 }
 
 TEST_F(Perceive, ABagWithWrongBytesNeverCrashes) {

@@ -135,6 +135,7 @@ const std::vector<Bad> kBad = {
     {kTunnel, "from: 10.0, to: 40.0, width: 8.0", "from: 60.0, to: 90.0, width: 40.0",
      "'design_line' folds its inner wall at s = "},
     {kTunnel, "angle: 1.5,", "angle: 6.2,", "'design_line' brings the walls at s = "},
+    {kTunnel, "wall_spacing: 0.5", "wall_spacing: 0.5\nwidth: 4.0", "'width' stands twice"},
     // Closing a loop.
     {kLoop, "angle: 1.5708", "angle: 1.2", "a closed line by 6.28319 rad"},
     {kLoop, "straight: {}", "straight: {length: 20.0}",
@@ -206,6 +207,29 @@ TEST(BadWorlds, EachIsRefusedNamingFileKeyUnitAndRange) {
     EXPECT_NE(told.find("bad_world.yaml: "), std::string::npos) << told;
     EXPECT_NE(told.find(bad.told), std::string::npos) << "wanted: " << bad.told << "\ntold:   " << told;
   }
+}
+
+std::string straights(int count, const std::string& length, const std::string& spacing) {
+  std::string text = "type: tunnel\nname: long\nseed: 1\nwidth: 5.0\nwall_spacing: " + spacing +
+                     "\nclosed: false\nstart_at: 10.0\n"
+                     "roughness: {sigma: 0.05, correlation_length: 2.0}\ndesign_line:\n";
+  for (int i = 0; i < count; ++i) text += "  - straight: {length: " + length + "}\n";
+  return text;
+}
+
+TEST(BadWorlds, ATunnelThatWouldTakeHoursOrAllMemoryIsRefused) {
+  EXPECT_EQ(refusal(straights(5, "2000.0", "0.5")), "(accepted)");
+  EXPECT_NE(refusal(straights(6, "2000.0", "0.5"))
+                .find("'design_line' is 12000 m long: more than 20000 wall_spacings of 0.5 m"),
+            std::string::npos);
+  EXPECT_NE(refusal(straights(1000, "2000.0", "5.0")).find("must be at most 100000 m"),
+            std::string::npos);
+  EXPECT_NE(refusal(straights(50000, "0.01", "0.5")).find("must hold at most 1000 pieces"),
+            std::string::npos);
+  std::string random = kRandom;
+  random.replace(random.find("min_length: 100.0"), 17, "min_length: 5000.0");
+  random.replace(random.find("wall_spacing: 0.5"), 17, "wall_spacing: 0.05");
+  EXPECT_NE(refusal(random).find("more than 20000 wall_spacings"), std::string::npos);
 }
 
 TEST(BadWorlds, FilesThatAreNoWorldsAreRefused) {

@@ -190,6 +190,16 @@ TEST_F(MapFiles, BadMapsAreRefusedByFileKeyUnitAndRange) {
   }
 }
 
+TEST_F(MapFiles, NoiseIsNoMap) {
+  std::vector<std::string> rows(1002, std::string(1002, '.'));
+  for (std::size_t y = 0; y < rows.size(); ++y) {
+    for (std::size_t x = y % 2; x < rows[y].size(); x += 2) rows[y][x] = '#';
+  }
+  writeImage(rows);
+  EXPECT_NE(refusal(kMap).find("'image' = 'image.pgm' is no map but noise: more than 500000 edges"),
+            std::string::npos);
+}
+
 TEST_F(MapFiles, BadLinesAreRefused) {
   writeImage({"#."});
   EXPECT_NE(refusal(kMap, "design_line: {closed: false, points: [0, 0, 1]}\n")

@@ -64,6 +64,9 @@ class CanBridge {
   /// same.
   void setCommand(const supervision::Command& command, Stamp now);
 
+  /// Refuses a command for a reason of the caller's, as setCommand() refuses one.
+  void rejectCommand(const supervision::Command& command, const std::string& why, Stamp now);
+
   /// Drains the bus, watches, runs the table, integrates odometry, sends what is due. Call at 50 Hz or
   /// more. A `now` before the last one is a clock that jumped.
   void tick(Stamp now);

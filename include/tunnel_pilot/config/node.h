@@ -32,6 +32,7 @@ struct ParameterRecord {
 class Node {
  public:
   /// `source` names the file or parameter namespace in messages; `path` is the key's way from its root.
+  /// Refuses what is no map, and a map with a key that stands twice.
   Node(const YAML::Node& yaml, std::string source, std::string path = "");
 
   /// Number in [min, max]; `unit` such as "m", "rad", "1" stands in the message.

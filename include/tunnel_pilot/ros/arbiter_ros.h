@@ -4,6 +4,7 @@
 #include <sensor_msgs/PointCloud2.h>
 #include <std_srvs/Trigger.h>
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -38,6 +39,7 @@ class ArbiterRos {
   void updateTunnel();
   void checkClock();
   void decide();
+  std::string unheardTopics() const;
   void fillStatus(Diagnostics::Status& status) const;
 
   supervision::Arbiter arbiter_;
@@ -45,6 +47,8 @@ class ArbiterRos {
   ClockWatch clock_;
   MotionInput motion_;
   TunnelInput tunnel_;
+  std::set<std::string> unheard_;  // topics that must speak before the first drive
+  unsigned long motion_refused_ = 0;
   ros::Publisher command_publisher_, state_publisher_;
   std::vector<ros::Subscriber> subscribers_;
   ros::ServiceServer stop_service_, reset_service_;

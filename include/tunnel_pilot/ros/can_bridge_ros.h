@@ -14,6 +14,7 @@
 #include "tunnel_pilot/can/embedded_bus.h"
 #include "tunnel_pilot/ros/clock_watch.h"
 #include "tunnel_pilot/ros/diagnostics.h"
+#include "tunnel_pilot/ros/publisher_watch.h"
 
 namespace tunnel_pilot::shell {
 
@@ -35,7 +36,8 @@ class CanBridgeRos {
   using Trigger = std_srvs::Trigger;
   using Edge = bridge::CanBridge::Answer (bridge::CanBridge::*)(Stamp);
 
-  void onCommand(const TruckCommand& message);
+  using CommandEvent = ros::MessageEvent<const TruckCommand>;
+  void onCommand(const CommandEvent& event);
   void tick(Stamp now);
   Stamp current() const;
   void publishMotion();
@@ -54,6 +56,7 @@ class CanBridgeRos {
   ros::Publisher joint_publisher_, odometry_publisher_, status_publisher_;
   tf2_ros::TransformBroadcaster transform_broadcaster_;
   std::vector<ros::ServiceServer> services_;
+  PublisherWatch publishers_;  // of command
   ros::Subscriber command_subscriber_, clock_subscriber_;
   ros::WallTimer timer_;
   std::unique_ptr<Diagnostics> diagnostics_;

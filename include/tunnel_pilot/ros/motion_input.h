@@ -11,8 +11,8 @@ namespace tunnel_pilot::shell {
 
 /// Makes one motion of the two topics that tell it: `odom` (pose, speed, yaw rate) and `joint_states`
 /// (articulation and, where the publisher knows it, its rate; otherwise the rate is the difference of
-/// the last two). The motion's stamp is the older of the two. Other joints' messages are passed over,
-/// and so are messages with numbers that are not finite: their age then tells.
+/// the last two). The motion's stamp is the older of the two. Other joints' messages are passed over;
+/// numbers that are not finite are passed on, for the arbiter stops at once for them.
 class MotionInput {
  public:
   void setJointState(const sensor_msgs::JointState& message);

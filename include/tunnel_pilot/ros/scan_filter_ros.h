@@ -8,6 +8,7 @@
 #include "tunnel_pilot/perception/scan_filter.h"
 #include "tunnel_pilot/ros/clock_watch.h"
 #include "tunnel_pilot/ros/diagnostics.h"
+#include "tunnel_pilot/ros/publisher_watch.h"
 #include "tunnel_pilot/ros/sensor_pose.h"
 
 namespace tunnel_pilot::shell {
@@ -16,13 +17,16 @@ namespace tunnel_pilot::shell {
 /// TF base_link -> the scan's frame once. Publishes `scan_filtered` (sensor_msgs/LaserScan, the
 /// network's 761 beams, frame of the scan) and `points` (sensor_msgs/PointCloud2 in base_link), both
 /// with the scan's stamp; nothing for a rejected scan, which is logged, counted and told on
-/// /diagnostics. Parameters: config/scan_filter.yaml. Throws config::ConfigError.
+/// /diagnostics. While more than one node publishes
+/// `scan`, every scan is rejected. Parameters:
+/// config/scan_filter.yaml. Throws config::ConfigError.
 class ScanFilterRos {
  public:
   ScanFilterRos(ros::NodeHandle nh, ros::NodeHandle private_nh);
 
  private:
-  void onScan(const sensor_msgs::LaserScan& message);
+  using ScanEvent = ros::MessageEvent<const sensor_msgs::LaserScan>;
+  void onScan(const ScanEvent& event);
   void publish(const perception::ScanFilter::Result& result, const sensor_msgs::LaserScan& source);
   void fillStatus(Diagnostics::Status& status) const;
 
@@ -30,6 +34,8 @@ class ScanFilterRos {
   SensorPose sensor_pose_;
   ClockWatch clock_;
   std::string problem_ = "no scan yet";  // why the last scan was not used; empty when it was
+  PublisherWatch publishers_;
+  std::uint64_t foreign_ = 0;  // scans rejected because more than one node published
   ros::Publisher scan_publisher_;
   ros::Publisher points_publisher_;
   ros::Subscriber scan_subscriber_;

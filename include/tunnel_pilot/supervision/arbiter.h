@@ -97,6 +97,8 @@ class Arbiter {
  public:
   Arbiter(const ArbiterParameters& parameters, const vehicle::TruckParameters& truck);
 
+  const ArbiterParameters& parameters() const { return parameters_; }
+
   void setProposal(Source source, const drivers::Proposal& proposal, Stamp now);
   void setWalls(const perception::Walls& walls, Stamp now);
   void setTunnel(const perception::Tunnel& tunnel, Stamp now);
@@ -155,6 +157,7 @@ class Arbiter {
   void assessTunnel(Stamp now, Findings& findings) const;
   void assessMotion(Stamp now, Findings& findings) const;
   void assessTruck(Stamp now, Findings& findings) const;
+  bool waitsForScan(const SourceRule& rule, Stamp now) const;
   void assessSources(Stamp now, Findings& findings) const;
   Findings assess(Stamp now) const;
   const SourceRule* bestSource(Stamp now) const;
@@ -190,6 +193,7 @@ class Arbiter {
   std::optional<geometry::Pose> centerline_pose_;  ///< its frame in odom
   Stamp points_stamp_{};
   std::optional<Stamp> scan_received_;
+  std::optional<Stamp> gap_ended_;  // when the last scan that was late came
   std::optional<Stamp> tunnel_received_, tunnel_valid_received_;
   std::optional<Stamp> motion_received_;
   bool motion_finite_ = true;
