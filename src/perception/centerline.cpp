@@ -305,22 +305,27 @@ void CenterlineEstimator::forgetBehind(const Pose& pose) {
   memory_.erase(memory_.begin(), memory_.begin() + static_cast<std::ptrdiff_t>(first));
 }
 
-// First and last node of the fit about node `i`: those within fit_reach, at the ends the whole first or
-// last stretch of the same length, and never fewer than kFewestInFit.
-std::pair<std::size_t, std::size_t> CenterlineEstimator::fitWindow(std::size_t i) const {
+// Moves a window on to node `i`: the nodes within fit_reach of it. `window` is that of a node before.
+CenterlineEstimator::Window CenterlineEstimator::slide(Window window, std::size_t i) const {
   const ArcLengthFit& fit = *fit_;
   const double reach = parameters_.fit_reach;
-  const std::size_t end = fit.size() - 1;
-  std::size_t first = i;
-  std::size_t last = i;
-  while (first > 0 && fit.s(i) - fit.s(first - 1) <= reach) --first;
-  while (last < end && fit.s(last + 1) - fit.s(i) <= reach) ++last;
+  while (fit.s(i) - fit.s(window.first) > reach) ++window.first;
+  window.last = std::max(window.last, i);
+  while (window.last + 1 < fit.size() && fit.s(window.last + 1) - fit.s(i) <= reach) ++window.last;
+  return window;
+}
+
+// At the ends the fit takes the whole first or last stretch of the same length, and never fewer nodes
+// than kFewestInFit.
+CenterlineEstimator::Window CenterlineEstimator::widened(Window window) const {
+  const ArcLengthFit& fit = *fit_;
   const auto too_small = [&] {
-    return last - first < kFewestInFit - 1 || fit.s(last) - fit.s(first) < 2.0 * reach - kCurveStep;
+    return window.last - window.first < kFewestInFit - 1 ||
+           fit.s(window.last) - fit.s(window.first) < 2.0 * parameters_.fit_reach - kCurveStep;
   };
-  while (last < end && too_small()) ++last;
-  while (first > 0 && too_small()) --first;
-  return {first, last};
+  while (window.last + 1 < fit.size() && too_small()) ++window.last;
+  while (window.first > 0 && too_small()) --window.first;
+  return window;
 }
 
 // Path samples of the nodes, each with the parabola's place, heading and curvature.
@@ -331,8 +336,10 @@ void CenterlineEstimator::fitPath() {
   // Nodes farther behind only bear on the fit beside the reference point.
   std::size_t begin = 0;
   while (begin + kFewestInFit < nodes_.size() && nodes_[begin].position.x() < -kPathBehind) ++begin;
+  Window near{0, 0};
   for (std::size_t i = begin; i < nodes_.size(); ++i) {
-    const auto [first, last] = fitWindow(i);
+    near = slide(near, i);
+    const auto [first, last] = widened(near);
     const ArcLengthFit::Parabola parabola = fit_->fit(first, last, fit_->s(i));
     const Point& place = parabola.place;
     const double s =
@@ -394,7 +401,7 @@ void CenterlineEstimator::fillState(const Walls& walls) {
 
 // Of the fit about node `at`, the nearest to the reference point, taken at that point's foot.
 void CenterlineEstimator::fillCovariance(const Walls& walls, std::size_t at) {
-  const auto [first, last] = fitWindow(at);
+  const auto [first, last] = widened(slide({0, 0}, at));
   const Point forward =
       (nodes_[std::min(at + 1, last)].position - nodes_[at > 0 ? at - 1 : at].position).normalized();
   const double foot = fit_->s(at) - nodes_[at].position.dot(forward);

@@ -105,6 +105,7 @@ struct WallSegmentation::Impl {
   PointGrid grid;
   std::vector<PointGroup> groups;
   std::vector<int> order;                         // finite points of the input, as indices
+  std::vector<int> inliers;                       // as long as ever needed, so that nothing is cleared
   std::array<std::vector<std::int8_t>, 2> taken;  // by side and group: the node it was taken for, or -1
   std::array<std::vector<float>, 2> seen;  // by side and node: share of the slice that shows the wall
 
@@ -569,7 +570,7 @@ void WallSegmentation::Impl::collectInliers(const pcl::PointCloud<pcl::PointXYZ>
   }
   const auto reach = static_cast<float>(p.inlier_distance);
   const std::vector<std::int8_t>& node_of = taken[side];
-  wall.indices.resize(order.size());
+  inliers.resize(std::max(inliers.size(), order.size()));
   std::size_t count = 0;
   float sum = 0.0F;
   for (std::size_t g = 0; g < groups.size(); ++g) {
@@ -585,12 +586,12 @@ void WallSegmentation::Impl::collectInliers(const pcl::PointCloud<pcl::PointXYZ>
       const float miss =
           n.frame.cosine * dy - n.frame.sine * dx - n.offset - n.half_bend * along * along;
       const bool on_wall = std::abs(miss) <= reach;
-      wall.indices[count] = index;
+      inliers[count] = index;
       count += on_wall ? 1 : 0;
       sum += on_wall ? miss * miss : 0.0F;
     }
   }
-  wall.indices.resize(count);
+  wall.indices.assign(inliers.begin(), inliers.begin() + static_cast<std::ptrdiff_t>(count));
   if (count > 0) wall.residual = std::sqrt(static_cast<double>(sum) / static_cast<double>(count));
 }
 

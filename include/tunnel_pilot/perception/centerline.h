@@ -2,7 +2,6 @@
 
 #include <memory>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "tunnel_pilot/config/node.h"
@@ -72,6 +71,12 @@ class CenterlineEstimator {
 
   enum class Fit { kGood, kBad, kApart };
 
+  // Nodes first..last.
+  struct Window {
+    std::size_t first;
+    std::size_t last;
+  };
+
   // Where a remembered node has one of its walls.
   struct RecalledWall {
     geometry::Point place;   // [m]
@@ -92,7 +97,8 @@ class CenterlineEstimator {
   void disbelieve();
   void appendMeasured();
   void forgetBehind(const geometry::Pose& pose);
-  std::pair<std::size_t, std::size_t> fitWindow(std::size_t i) const;
+  Window slide(Window window, std::size_t i) const;
+  Window widened(Window window) const;
   void fitPath();
   bool isPlausible();
   void prolongBackwards();
