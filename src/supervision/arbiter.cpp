@@ -118,6 +118,7 @@ void Arbiter::clockJumped() {
   truck_state_received_.reset();
   centerline_pose_.reset();
   corridor_stamp_.reset();
+  free_ways_.clear();
   slow_until_.reset();
   wait_until_.reset();
   last_hit_.reset();
@@ -297,8 +298,9 @@ Arbiter::Speed Arbiter::chooseSpeed(Stamp now) {
     }
   }
   if (corridor_stamp_) {
-    const bool blocked = envelope_.result().free_until != Envelope::End::kSight;
-    take(governor_.stoppingWithin(freeDistance()), blocked ? SpeedLimit::kObstacle : SpeedLimit::kSight);
+    const FreeWay free = freeWay();
+    const bool blocked = free.until != Envelope::End::kSight;
+    take(governor_.stoppingWithin(free.distance), blocked ? SpeedLimit::kObstacle : SpeedLimit::kSight);
   }
   decision_.speed_limit = lowest.value;
   for (const SourceRule& rule : parameters_.sources) {
@@ -311,8 +313,13 @@ Arbiter::Speed Arbiter::chooseSpeed(Stamp now) {
 
 // ---- the corridor
 
-double Arbiter::freeDistance() const {
-  return std::max(0.0, envelope_.result().free_distance - driven_since_corridor_);
+// The longest that the last obstacle_scans scans told: a clump of dust in one of them shall not brake
+// the truck.
+Arbiter::FreeWay Arbiter::freeWay() const {
+  const auto shorter = [](const FreeWay& a, const FreeWay& b) { return a.distance < b.distance; };
+  FreeWay free = *std::max_element(free_ways_.begin(), free_ways_.end(), shorter);
+  free.distance = std::max(0.0, free.distance);
+  return free;
 }
 
 // Compares each scan once, when its points, walls and tunnel have all come; in between, the way driven
@@ -325,18 +332,20 @@ void Arbiter::updateCorridor(double commanded, Stamp now) {
   const drivers::Motion& motion = history_.latest();
   const std::optional<geometry::Pose> scan_pose = history_.poseAt(points_stamp_);
   const std::optional<geometry::Pose> here = history_.poseAt(now);
-  if (!complete || !fresh || !scan_pose || !here) {
-    driven_since_corridor_ += std::abs(motion.speed) * age(last_ ? last_ : now, now);
-    return;
-  }
+  for (FreeWay& free : free_ways_)
+    free.distance -= std::abs(motion.speed) * age(last_ ? last_ : now, now);
+  if (!complete || !fresh || !scan_pose || !here) return;
   const geometry::Pose path_frame =
       centerline_pose_ ? scan_pose->relative(*centerline_pose_) : geometry::Pose{};
   envelope_.update({walls_, points_, centerline_, centerline_pose_ ? profile_ : no_profile_, path_frame,
                     scan_pose->relative(*here), *scan_pose, motion.articulation, commanded,
                     std::abs(motion.speed)});
   corridor_stamp_ = points_stamp_;
-  driven_since_corridor_ = 0.0;
   const Envelope::Result& result = envelope_.result();
+  free_ways_.push_back({result.free_distance, result.free_until});
+  if (free_ways_.size() > static_cast<std::size_t>(parameters_.obstacle_scans)) {
+    free_ways_.erase(free_ways_.begin());
+  }
   const double needed =
       envelope_.stoppingDistance(std::abs(motion.speed)) + parameters_.envelope.reserve;
   const bool obstructed = result.free_until != Envelope::End::kSight && result.free_distance < needed;
@@ -350,7 +359,7 @@ void Arbiter::tellCorridor() {
   const Envelope::Result& result = envelope_.result();
   decision_.clearance_left = known ? result.clearance_left : unknown;
   decision_.clearance_right = known ? result.clearance_right : unknown;
-  decision_.free_distance = known ? freeDistance() : unknown;
+  decision_.free_distance = known ? freeWay().distance : unknown;
   decision_.stopping_distance =
       history_.empty() ? unknown : envelope_.stoppingDistance(std::abs(history_.latest().speed));
   decision_.corridor_left = result.corridor_left;

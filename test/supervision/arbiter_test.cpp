@@ -410,7 +410,9 @@ TEST(Arbiter, OneScanOfAnObstacleIsNotBelieved) {
   ArbiterBench bench;
   bench.drive();
   bench.obstacle = 5.0;
-  bench.cycle();
+  const Decision& decision = bench.cycle();
+  EXPECT_NE(decision.limited_by, SpeedLimit::kObstacle);
+  EXPECT_EQ(decision.command.reason, Reason::kNone);
   bench.obstacle.reset();
   EXPECT_FALSE(bench.cycles(20).command.stop);
 }
@@ -449,7 +451,7 @@ TEST(Arbiter, BeforeAnObstacleThatComesAndGoesTheTruckStandsUntilTheWayIsFreeFor
       EXPECT_EQ(free.command.reason, Reason::kObstacle);
     }
     bench.obstacle = 3.4;
-    bench.cycle();
+    bench.cycles(2);
   }
   bench.obstacle.reset();
   EXPECT_GT(bench.cycles(60).command.speed, 0.0);

@@ -130,6 +130,12 @@ class Arbiter {
     std::optional<Stamp> received;
   };
   enum class Health { kNever, kStale, kInvalid, kUnable, kHealthy };
+  /// How far the corridor ahead is free, and what ends it.
+  struct FreeWay {
+    double distance;  ///< [m]
+    Envelope::End until;
+  };
+
   struct Steering {
     Source source = Source::kHold;
     double articulation = 0.0;
@@ -167,7 +173,7 @@ class Arbiter {
   Speed chooseSpeed(Stamp now);
   Speed waitForFreeWay(const Speed& speed, Stamp now);
   bool slowNow(Reason found, Stamp now);
-  double freeDistance() const;
+  FreeWay freeWay() const;
   void updateCorridor(double commanded, Stamp now);
   void tellCorridor();
   void latch(Findings& findings, Stamp now);
@@ -202,8 +208,8 @@ class Arbiter {
   bool standby_seen_ = false;  ///< the truck was neither engaged nor stopping once
 
   std::optional<Stamp> corridor_stamp_;  ///< of the scan last compared
-  double driven_since_corridor_ = 0.0;   ///< [m]
-  int obstructed_scans_ = 0;             ///< one after the other
+  std::vector<FreeWay> free_ways_;  ///< of the last obstacle_scans scans, less what was driven since
+  int obstructed_scans_ = 0;        ///< one after the other
   Reason obstruction_ = Reason::kObstacle;
 
   Decision decision_;
