@@ -17,11 +17,17 @@ refuse() {
 }
 
 # Starts a command in the background with no input and a process group of its own, so that a signal to the
-# script alone is heard at once and reaches the command with all its children.
+# script alone is heard at once and reaches the command with all its children. What it says goes to the file
+# `output`, if a caller named one: a redirection around this would swallow the script's own last words, too.
 running=
+output=
 start() {
   set -m
-  "$@" </dev/null &
+  if [ -n "$output" ]; then
+    "$@" </dev/null >>"$output" 2>&1 &
+  else
+    "$@" </dev/null &
+  fi
   running=$!
   set +m
 }
@@ -38,7 +44,7 @@ limited() {
   shift
   start timeout --kill-after=20 "$seconds" "$@"
   finished || status=$?
-  [ "$status" -ne 124 ] || echo "no end after $seconds s: $*" >&2
+  [ "$status" -ne 124 ] || printf 'no end after %s s: %s\n' "$seconds" "$*" >>"${output:-/dev/stderr}"
   return "$status"
 }
 
@@ -74,7 +80,7 @@ stop_telling() {
 
 # Installs those of the packages named in the given list files that are missing.
 install_packages() {
-  local wanted missing sudo=() log status=0
+  local wanted missing sudo=() log output="" status=0
   mapfile -t wanted < <(grep -hv '^#' "$@")
   # Status and name of those that dpkg knows; what is not installed is missing.
   mapfile -t missing < <(comm -23 <(printf '%s\n' "${wanted[@]}" | sort -u) \
@@ -92,10 +98,11 @@ install_packages() {
   fi
   log=$(mktemp)
   say "installing ${#missing[@]} packages and what they need; the first time some minutes (log: $log)"
+  output=$log
   tell_time installing
   { limited 600 "${sudo[@]}" apt-get update -o APT::Update::Error-Mode=any &&
     limited 7200 "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive \
-      apt-get install -y --no-install-recommends "${missing[@]}"; } >"$log" 2>&1 || status=$?
+      apt-get install -y --no-install-recommends "${missing[@]}"; } || status=$?
   stop_telling
   if [ "$status" -ne 0 ]; then
     tail -n 20 "$log" >&2
@@ -125,17 +132,18 @@ make_in() {
 
 # Configures a folder with the options before the --, builds the targets behind it, says where it goes wrong.
 build_in() {
-  local folder=$1 log=$1/build.log options=() status=0
+  local folder=$1 log=$1/build.log output=$1/build.log options=() status=0
   shift
   while [ "$1" != -- ]; do options+=("$1"); shift; done
   shift
   mkdir -p "$folder"
   exec 8<"$folder"  # two makes in one folder would spoil each other's files
-  flock --nonblock 8 || { say "waiting for another build in $folder"; limited 10800 flock 8; }
+  flock --nonblock 8 || { say "waiting for another build in $folder"; output="" limited 10800 flock 8; }
   say "building; the first time some minutes (log: $log)"
   export CCACHE_BASEDIR="$PWD" CCACHE_NOHASHDIR=1
   tell_time building
-  { configure "$folder" "${options[@]}" && make_in "$folder" "$@"; } >"$log" 2>&1 || status=$?
+  : >"$log"
+  { configure "$folder" "${options[@]}" && make_in "$folder" "$@"; } || status=$?
   stop_telling
   exec 8<&-
   [ "$status" -eq 0 ] && return 0
