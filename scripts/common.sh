@@ -38,13 +38,18 @@ finished() {
   return "$status"
 }
 
+too_long() {
+  local message="no end after $1 s: ${*:2}"
+  if [ -n "$output" ]; then echo "$message" >>"$output"; else echo "$message" >&2; fi
+}
+
 # Runs a command so, for at most so many seconds.
 limited() {
   local seconds=$1 status=0
   shift
   start timeout --kill-after=20 "$seconds" "$@"
   finished || status=$?
-  [ "$status" -ne 124 ] || printf 'no end after %s s: %s\n' "$seconds" "$*" >>"${output:-/dev/stderr}"
+  [ "$status" -ne 124 ] || too_long "$seconds" "$@"
   return "$status"
 }
 
