@@ -16,6 +16,8 @@
 namespace tunnel_pilot::can {
 namespace {
 
+constexpr int kBindTries = 10;
+
 static_assert(sizeof(can_frame) == 16, "the datagrams' layout is part of the interface");
 
 void checkName(const std::string& name) {
@@ -37,13 +39,12 @@ void makePrivateFolder(const std::string& folder) {
   }
 }
 
-std::string makeBusFolder(const std::string& name) {
+std::string busFolder(const std::string& name) {
   const char* runtime = std::getenv("XDG_RUNTIME_DIR");
   const bool has_runtime = runtime != nullptr && runtime[0] == '/' && access(runtime, W_OK) == 0;
   const std::string base = has_runtime ? std::string(runtime) + "/tunnel_pilot_can"
                                        : "/tmp/tunnel_pilot_can." + std::to_string(geteuid());
   makePrivateFolder(base);
-  makePrivateFolder(base + "/" + name);
   return base + "/" + name;
 }
 
@@ -95,16 +96,23 @@ std::optional<Frame> fromLinux(const can_frame& in) {
 
 EmbeddedBus::EmbeddedBus(const std::string& name) {
   checkName(name);
-  folder_ = makeBusFolder(name);
+  folder_ = busFolder(name);
   static std::atomic<unsigned> count{0};
   path_ = folder_ + "/" + std::to_string(getpid()) + "-" + std::to_string(count++) + ".sock";
   const sockaddr_un address = addressOf(path_);
+  makePrivateFolder(folder_);
   removeStaleSockets();
   socket_ = socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (socket_ < 0)
     throw std::runtime_error(std::string("embedded CAN bus: socket: ") + std::strerror(errno));
   unlink(path_.c_str());  // left by a dead process that had our number
-  if (bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) {
+  int bound = -1;
+  for (int i = 0; i < kBindTries; ++i) {
+    bound = bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof(address));
+    if (bound == 0 || errno != ENOENT) break;
+    makePrivateFolder(folder_);  // the last one before us left meanwhile, and took it along
+  }
+  if (bound != 0) {
     const std::string why = std::strerror(errno);
     close(socket_);
     throw std::runtime_error("embedded CAN bus: cannot bind " + path_ + ": " + why);
@@ -114,6 +122,7 @@ EmbeddedBus::EmbeddedBus(const std::string& name) {
 EmbeddedBus::~EmbeddedBus() {
   unlink(path_.c_str());
   close(socket_);
+  rmdir(folder_.c_str());  // refused as long as anybody else is on the bus
 }
 
 void EmbeddedBus::removeStaleSockets() {

@@ -16,6 +16,7 @@ namespace {
 
 constexpr double kTick = 0.25;  // [s] steady time
 constexpr int kTicksPerProgress = 8;
+constexpr const char* kStandardOutput = "-";
 constexpr double kDegrees = 57.29577951308232;
 
 // Figures are told to a tenth of a millimetre; more digits would be noise.
@@ -141,9 +142,12 @@ void LapMonitor::finish(const std::string& failure) {
   passed_ = reason.empty();
   if (!*passed_) figures["reason"] = reason;
   const std::string line = (*passed_ ? "PASS " : "FAIL ") + figures.dump();
-  std::printf("%s\n", line.c_str());
-  std::fflush(stdout);
-  if (!verdict_file_.empty()) std::ofstream(verdict_file_) << line << "\n";
+  std::ofstream file;
+  if (verdict_file_ != kStandardOutput) file.open(verdict_file_);
+  if (!file.is_open() || !(file << line << "\n").flush()) {
+    std::printf("%s\n", line.c_str());
+    std::fflush(stdout);
+  }
   ros::requestShutdown();
 }
 

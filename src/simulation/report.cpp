@@ -1,8 +1,12 @@
 #include "tunnel_pilot/simulation/report.h"
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -251,13 +255,20 @@ std::string table(const Scenario& scenario, const Evaluation& evaluation) {
   return out;
 }
 
+void makeReportFolder(const std::string& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw std::runtime_error("cannot make folder '" + folder + "': " + error.message());
+  if (access(folder.c_str(), W_OK | X_OK) != 0) {
+    throw std::runtime_error("cannot write into '" + folder + "': " + std::strerror(errno));
+  }
+}
+
 void writeReport(const std::string& folder, const Scenario& scenario, const Evaluation& evaluation,
                  const std::vector<EpisodeResult>& episodes, const Fingerprints& fingerprints,
                  const vehicle::TruckGeometry& truck) {
   const std::filesystem::path path(folder);
-  std::error_code error;
-  std::filesystem::create_directories(path, error);
-  if (error) throw std::runtime_error("cannot make folder '" + folder + "': " + error.message());
+  makeReportFolder(folder);
   removeEpisodeFiles(path);
   writeSummary(path, scenario, evaluation, episodes, fingerprints);
   writeEpisodes(path, episodes);

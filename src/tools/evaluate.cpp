@@ -109,6 +109,8 @@ bool evaluate(const std::string& file, const Arguments& arguments) {
   const int seeds = arguments.seeds > 0 ? arguments.seeds : scenario.seeds;
   const simulation::Setup setup = simulation::loadSetup(scenario);
   const auto plans = simulation::episodePlans(scenario, seeds);
+  const std::string folder = arguments.out.empty() ? "" : arguments.out + "/" + scenario.name;
+  if (!folder.empty()) simulation::makeReportFolder(folder);  // one that cannot be is told before the runs
 
   ProgressLine progress(scenario.name, plans.size());
   const auto start = std::chrono::steady_clock::now();
@@ -122,9 +124,9 @@ bool evaluate(const std::string& file, const Arguments& arguments) {
               simulatedTime(episodes) / std::max(elapsed, 1e-9), endings(episodes).c_str(),
               evaluation.passed ? "Every goal holds." : "A goal is MISSED.");
   std::fflush(stdout);
-  if (!arguments.out.empty()) {
-    simulation::writeReport(arguments.out + "/" + scenario.name, scenario, evaluation, episodes,
-                            setup.fingerprints, setup.truck.geometry);
+  if (!folder.empty()) {
+    simulation::writeReport(folder, scenario, evaluation, episodes, setup.fingerprints,
+                            setup.truck.geometry);
   }
   return evaluation.passed;
 }

@@ -40,14 +40,21 @@ const std::vector<std::pair<std::string, std::function<void(const config::Node&)
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
-    std::cerr << "usage: parameters CONFIG_FOLDER\n";
+  const std::string usage =
+      "parameters CONFIG_FOLDER: prints every parameter as a JSON list of file, key, value, unit and range.\n";
+  const std::string argument = argc == 2 ? argv[1] : "";
+  if (argument == "--help" || argument == "-h") {
+    std::cout << usage;
+    return 0;
+  }
+  if (argument.empty() || argument[0] == '-') {
+    std::cerr << usage;
     return 2;
   }
   try {
     nlohmann::ordered_json list = nlohmann::ordered_json::array();
     for (const auto& [name, load] : kLoaders) {
-      const config::Node node = config::loadFile(std::string(argv[1]) + "/" + name + ".yaml");
+      const config::Node node = config::loadFile(argument + "/" + name + ".yaml");
       load(node);
       for (const config::ParameterRecord& r : node.records()) {
         list.push_back({{"file", name}, {"key", r.key}, {"value", r.value}, {"unit", r.unit}, {"range", r.range}});

@@ -30,7 +30,7 @@ namespace {
 namespace options = boost::program_options;
 using namespace tunnel_pilot;
 
-constexpr const char* kOdometryTopic = "/odom";
+constexpr const char* kOdometryTopic = "odom";
 constexpr int kDone = 0;
 constexpr int kBadInput = 2;
 constexpr rlim_t kMemoryLimit = rlim_t{4} << 30;  // a bag's own sizes are not to be trusted [bytes]
@@ -57,7 +57,7 @@ bool parse(int argc, char** argv, Arguments& arguments) {
       "config", options::value(&arguments.config)->value_name("DIR"),
       "scan_filter.yaml, wall_segmentation.yaml or centerline.yaml found here replace the package's "
       "own, "
-      "for instance config/corridor for widths of 1.5 to 4 m")(
+      "for instance config/corridor for widths of 1.3 to 4.2 m")(
       "transform", options::value(&arguments.transform)->multitoken()->value_name("X Y YAW"),
       "laser in base_link [m m rad]; without it the laser's frame is taken as base_link");
   using Style = options::command_line_style::style_t;
@@ -119,22 +119,24 @@ std::vector<std::string> topicsOfType(const rosbag::Bag& bag, const std::string&
   return topics;
 }
 
+// Some bags name their topics with the leading slash, some without.
+bool sameTopic(const std::string& a, const std::string& b) {
+  const auto bare = [](const std::string& topic) { return topic.substr(topic.rfind('/', 0) == 0 ? 1 : 0); };
+  return bare(a) == bare(b);
+}
+
 std::string scanTopic(const rosbag::Bag& bag, const std::string& wanted) {
   const std::vector<std::string> topics = topicsOfType(bag, "sensor_msgs/LaserScan");
   std::string list;
   for (const std::string& topic : topics) list += " " + topic;
   if (topics.empty()) throw std::runtime_error("the bag holds no sensor_msgs/LaserScan");
-  const auto has = [&](const std::string& topic) {
-    return std::find(topics.begin(), topics.end(), topic) != topics.end();
-  };
+  if (wanted.empty() && topics.size() == 1) return topics.front();
+  for (const std::string& topic : topics) {
+    if (sameTopic(topic, wanted.empty() ? "scan" : wanted)) return topic;
+  }
   if (!wanted.empty()) {
-    for (const std::string& topic : {wanted, "/" + wanted}) {
-      if (has(topic)) return topic;
-    }
     throw std::runtime_error("the bag has no scans on '" + wanted + "', but on" + list);
   }
-  if (topics.size() == 1) return topics.front();
-  if (has("/scan")) return "/scan";
   throw std::runtime_error("the bag has several scan topics, choose one with --topic:" + list);
 }
 
@@ -212,7 +214,9 @@ class Perceiver {
 void readBag(const Arguments& arguments, Perceiver& perceiver) {
   rosbag::Bag bag(arguments.bag, rosbag::bagmode::Read);
   const std::string topic = scanTopic(bag, arguments.topic);
-  rosbag::View view(bag, rosbag::TopicQuery(std::vector<std::string>{topic, kOdometryTopic}));
+  rosbag::View view(bag, [&](const rosbag::ConnectionInfo* connection) {
+    return connection->topic == topic || sameTopic(connection->topic, kOdometryTopic);
+  });
   for (const rosbag::MessageInstance& message : view) {
     if (message.getTopic() == topic) {
       const auto scan = message.instantiate<sensor_msgs::LaserScan>();
@@ -242,6 +246,9 @@ void perceive(const Arguments& arguments) {
   if (!out) throw std::runtime_error("cannot write '" + arguments.csv + "'");
   for (const auto& [answer, count] : perceiver.answers()) {
     std::cerr << "perceive: " << count << " scans: " << answer << "\n";
+  }
+  if (perceiver.answers().count("valid") == 0 && arguments.config.empty()) {
+    std::cerr << "perceive: no tunnel seen; corridors of 1.3 to 4.2 m need --config config/corridor\n";
   }
 }
 

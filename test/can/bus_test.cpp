@@ -121,6 +121,19 @@ TEST(EmbeddedBus, CrossesProcesses) {
   waitpid(child, nullptr, 0);
 }
 
+TEST(EmbeddedBus, LeavesNoFolderBehind) {
+  std::string folder;
+  {
+    EmbeddedBus a(uniqueName("gone"));
+    folder = a.folder();
+    { EmbeddedBus b(uniqueName("gone")); }
+    EXPECT_TRUE(std::filesystem::exists(folder)) << "one is still there";
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder));
+  EmbeddedBus again(uniqueName("gone"));
+  EXPECT_TRUE(std::filesystem::exists(folder));
+}
+
 TEST(EmbeddedBus, TwoNamesAreTwoBuses) {
   EmbeddedBus a(uniqueName("one")), b(uniqueName("two"));
   a.send(makeFrame(1));

@@ -2,7 +2,7 @@
 """Frames made by an independent codec (cantools, from PyPI) out of config/tunnel_pilot.dbc.
 
   make_vectors.py --write     writes vectors.csv beside this file
-  make_vectors.py --check     makes them again and compares; exit status 77 where cantools is missing
+  make_vectors.py --check     makes them again and compares; exit status 77 where cantools cannot be had
   --venv DIR                  makes a virtual environment there, installs cantools, runs inside it
 
 One line each: kind,frame,bytes in hex,Signal=value,... in the units of the wire.
@@ -13,6 +13,7 @@ import argparse
 import os
 import pathlib
 import random
+import shutil
 import subprocess
 import sys
 import venv
@@ -93,11 +94,23 @@ def make_lines():
     return '\n'.join(lines) + '\n'
 
 
+def can_import_cantools(python):
+    try:
+        return subprocess.run([python, '-c', 'import cantools'], stderr=subprocess.DEVNULL).returncode == 0
+    except OSError:
+        return False
+
+
 def rerun_in_venv(folder, arguments):
     python = pathlib.Path(folder) / 'bin' / 'python3'
-    if not python.exists():
-        venv.create(folder, with_pip=True)
-        subprocess.run([python, '-m', 'pip', 'install', '--quiet', CANTOOLS], check=True)
+    if not can_import_cantools(python):
+        try:
+            venv.create(folder, with_pip=True, clear=True)
+            subprocess.run([python, '-m', 'pip', 'install', '--quiet', '--retries', '1', CANTOOLS], check=True)
+        except (OSError, subprocess.CalledProcessError) as error:
+            shutil.rmtree(folder, ignore_errors=True)  # the next try begins anew
+            print(f'{error}\n{CANTOOLS} could not be installed from PyPI: nothing checked')
+            return 77
     os.execv(python, [str(python), __file__] + arguments)
 
 
@@ -109,7 +122,7 @@ def main():
     parser.add_argument('--venv')
     options = parser.parse_args()
     if options.venv:
-        rerun_in_venv(options.venv, ['--write' if options.write else '--check'])
+        return rerun_in_venv(options.venv, ['--write' if options.write else '--check'])
     try:
         lines = make_lines()
     except ImportError:

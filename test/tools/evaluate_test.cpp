@@ -104,6 +104,13 @@ TEST_F(Evaluate, BadInputExitsTwoAndSaysWhy) {
   }
 }
 
+TEST_F(Evaluate, AFolderThatCannotBeIsToldBeforeTheRuns) {
+  const std::string good = scenario("{metric: completed, paper: '-', judge: every_seed, min: 1.0}");
+  const Outcome outcome = evaluate({good, "--out", "/dev/null/out"});
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_EQ(outcome.output.find("episodes"), std::string::npos) << outcome.output;
+}
+
 TEST_F(Evaluate, HelpExplainsItsOptions) {
   const Outcome outcome = evaluate({"--help"});
   EXPECT_EQ(outcome.status, 0);

@@ -79,11 +79,12 @@ class Perceive : public ::testing::Test {
   std::string bag() const { return place_.file("drift.bag"); }
   std::string csv() const { return place_.file("out.csv"); }
 
-  static void writeBag(const std::string& file, const std::vector<std::string>& topics, int scans) {
+  static void writeBag(const std::string& file, const std::vector<std::string>& topics, int scans,
+                       double half_width = 2.5) {
     const auto parameters =
         simulation::loadSimulator(config::loadFile(kPackage + "/config/simulator.yaml")).lidar;
-    const std::vector<world::WallChain> walls = {{{-50.0, 2.5}, {80.0, 2.5}},
-                                                 {{-50.0, -2.5}, {80.0, -2.5}}};
+    const std::vector<world::WallChain> walls = {{{-50.0, half_width}, {80.0, half_width}},
+                                                 {{-50.0, -half_width}, {80.0, -half_width}}};
     const world::RayCaster caster(walls, simulation::LidarModel::beams(parameters));
     simulation::LidarModel lidar(parameters, 1000);
     rosbag::Bag out(file, rosbag::bagmode::Write);
@@ -145,6 +146,22 @@ TEST_F(Perceive, AmongSeveralScanTopicsOneMustBeChosen) {
   EXPECT_EQ(perceive({"--bag", place_.file("two.bag"), "--csv", csv(), "--topic", "right"}).status, 0);
   EXPECT_EQ(rowsOf(csv()).size(), 3u);
   EXPECT_EQ(perceive({"--bag", place_.file("two.bag"), "--csv", csv(), "--topic", "/odom"}).status, 2);
+}
+
+TEST_F(Perceive, ATopicIsFoundWithItsSlashAndWithout) {
+  writeBag(place_.file("bare.bag"), {"left", "right"}, 3);
+  for (const char* topic : {"right", "/right"}) {
+    EXPECT_EQ(perceive({"--bag", place_.file("bare.bag"), "--csv", csv(), "--topic", topic}).status, 0);
+    EXPECT_EQ(rowsOf(csv()).size(), 3u);
+  }
+  writeBag(place_.file("scan.bag"), {"left", "scan"}, 3);
+  EXPECT_EQ(perceive({"--bag", place_.file("scan.bag"), "--csv", csv()}).status, 0);
+}
+
+TEST_F(Perceive, WhereNoTunnelIsSeenOtherWidthsAreNamed) {
+  EXPECT_EQ(perceive({"--bag", bag(), "--csv", csv()}).output.find("config/corridor"), std::string::npos);
+  writeBag(bag(), {"/scan"}, 1, 1.0);
+  EXPECT_NE(perceive({"--bag", bag(), "--csv", csv()}).output.find("config/corridor"), std::string::npos);
 }
 
 TEST_F(Perceive, BadInputExitsTwoAndSaysWhy) {

@@ -28,11 +28,11 @@ LapMonitorParameters loadLapMonitor(config::Node node);
 
 /// The demonstration's operator and judge. Calls `engage` until the bridge agrees, watches the
 /// simulator's truth for one lap, prints a progress line every two seconds, and ends the process'
-/// spinning with one line on standard output, PASS {json} or FAIL {json}: lap_time_s, lateral_mean_m,
+/// spinning with one line, PASS {json} or FAIL {json}: lap_time_s, lateral_mean_m,
 /// lateral_rms_m, lateral_max_m, heading_mean_deg, clearance_min_m, contacts, real_time_factor and,
 /// after a failure, reason. It passes with one whole lap, no contact and the lateral goals kept.
 /// Subscribes `truth`, `truck_status`, `arbiter_state`. Parameters: config/lap_monitor.yaml and
-/// `verdict_file`, a file that gets the last line as well (empty: none). Throws config::ConfigError.
+/// `verdict_file`, which gets that line (-, or what cannot be written: standard output). Throws config::ConfigError.
 class LapMonitor {
  public:
   LapMonitor(ros::NodeHandle nh, ros::NodeHandle private_nh);
