@@ -14,7 +14,10 @@ std::optional<can::Frame> BusTap::receive() {
 
 std::uint64_t BusTap::count() {
   while (const auto frame = bus_->receive()) {
-    if (frame->id == counted_ && !frame->extended) ++count_;
+    if (frame->id == counted_ && !frame->extended) {
+      ++count_;
+      newest_ = *frame;
+    }
     if (waiting_.size() < kQueueLength) waiting_.push_back(*frame);
   }
   return count_;

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tunnel_pilot/can/codec.h"
 #include "tunnel_pilot/can/embedded_bus.h"
 #include "tunnel_pilot/can/layout.h"
 #include "tunnel_pilot/ros/conversions.h"
@@ -20,12 +21,20 @@ namespace {
 constexpr Stamp kClockPeriod = std::chrono::milliseconds(10);
 constexpr Stamp kFramePeriod = std::chrono::milliseconds(20);
 constexpr Stamp kObstaclePeriod = std::chrono::milliseconds(50);
-constexpr double kLongestWait = 0.25;    // [s] steady time
+constexpr double kLongestPoll = 0.02;    // [s] steady time, the rest of a longer one was not ours
 constexpr double kWallHeight = 1.5;      // of the pictured walls [m]
 constexpr double kObstacleHeight = 1.7;  // of the pictured obstacles [m]
 
 // True when the step from `before` to `now` reached another multiple of the period.
 bool isDue(Stamp before, Stamp now, Stamp period) { return before / period != now / period; }
+
+// True when the bridge spoke (TP_COMMAND_INFO) before it knew the command whose measurement is `stamp`.
+bool overtakes(const can::Frame& frame, Stamp stamp) {
+  const auto info = can::decode<can::CommandInfoFrame>(frame);
+  if (!info) return false;
+  const auto expected = std::chrono::duration_cast<std::chrono::milliseconds>(stamp).count();
+  return static_cast<std::int16_t>(info->measurement_stamp_ms - expected) < 0;  // modulo 65536
+}
 
 using visualization_msgs::Marker;
 using visualization_msgs::MarkerArray;
@@ -158,8 +167,8 @@ void SimulatorRos::configure(const ros::NodeHandle& private_nh) {
   options.seed = seed;
   options.reversed = own.boolean("reversed");
   auto world = world::loadWorld(own.text("world_file"), options);
-  bus_ =
-      std::make_unique<BusTap>(std::make_unique<can::EmbeddedBus>(own.text("bus")), can::kTpCommandId);
+  bus_ = std::make_unique<BusTap>(std::make_unique<can::EmbeddedBus>(own.text("bus")),
+                                  can::kTpCommandInfoId);
   own.finish();
 
   const auto simulator = simulation::loadSimulator(parameters.rest());
@@ -179,10 +188,7 @@ void SimulatorRos::advertise(ros::NodeHandle& nh, ros::NodeHandle& private_nh) {
   walls_publisher_ = private_nh.advertise<MarkerArray>("walls", 1, true);
   obstacles_publisher_ = private_nh.advertise<MarkerArray>("obstacles", 1, true);
   const auto hints = ros::TransportHints().tcpNoDelay();
-  command_subscriber_ = nh.subscribe<TruckCommand>(
-      "command", 10,
-      [this](const TruckCommand::ConstPtr& m) { command_stamp_ = toCore(m->header.stamp); },
-      ros::VoidConstPtr(), hints);
+  command_subscriber_ = nh.subscribe("command", 10, &SimulatorRos::onCommand, this, hints);
   odometry_subscriber_ = nh.subscribe("odom", 10, &SimulatorRos::onOdometry, this, hints);
   reset_service_ = private_nh.advertiseService("reset", &SimulatorRos::onReset, this);
   pause_service_ = private_nh.advertiseService("pause", &SimulatorRos::onPause, this);
@@ -211,44 +217,66 @@ void SimulatorRos::advance() {
   if (isDue(before, now, kFramePeriod)) awaitBridge();
   if (isDue(before, now, kObstaclePeriod) && !simulator_->world().obstacles.empty()) publishObstacles();
   if (!clock_due) return;
-  const bool lockstep = command_lockstep_.alive && bridge_lockstep_.alive;
-  pace_.hold(now,
-             lockstep || (real_time_factor_ > 0.0 && real_time_factor_ < 1.0) ? real_time_factor_ : 1.0);
+  const bool slow = real_time_factor_ > 0.0 && real_time_factor_ < 1.0;
+  pace_.hold(now, inLockstep() || slow ? real_time_factor_ : 1.0);
   queue_.callAvailable();
 }
 
-// Lets the pilot answer. An answer that comes without having been waited for brings the lockstep back.
+// Lets a partner answer. Silent is who does not answer while this process runs: a machine that holds up
+// all of its processes makes nobody silent. An answer that comes without having been waited for brings
+// the lockstep back.
 template <class Answered>
-void SimulatorRos::await(Lockstep& lockstep, Answered answered) {
-  const ros::SteadyTime start = ros::SteadyTime::now();
+void SimulatorRos::await(Partner& partner, const ros::Subscriber& topic, Answered answered) {
+  double silence = 0.0;
+  ros::SteadyTime last = ros::SteadyTime::now();
   while (!answered()) {
-    if (!lockstep.alive) return;
-    if ((ros::SteadyTime::now() - start).toSec() > kLongestWait) {
-      ++lockstep.misses;
-      lockstep.alive = ++lockstep.misses_in_row < kMissesAllowed;
-      return;
-    }
+    if (!partner.alive || !ros::ok()) return;
+    const ros::SteadyTime steady = ros::SteadyTime::now();
+    silence += std::min((steady - last).toSec(), kLongestPoll);
+    last = steady;
+    if (silence < kLongestSilence && topic.getNumPublishers() > 0) continue;
+    partner.alive = false;
+    ++partner.given_up;
+    ROS_WARN("simulator: the %s is silent: time goes on without it", partner.name);
+    diagnostics_->tell();
+    return;
   }
-  lockstep.misses_in_row = 0;
-  lockstep.alive = true;
+  partner.alive = topic.getNumPublishers() > 0;  // otherwise it could not be seen to leave
 }
 
 void SimulatorRos::awaitCommand(Stamp stamp) {
-  // Without lockstep, the answer to the scan before is already a sign of life.
-  const Stamp least = command_lockstep_.alive ? stamp : stamp - 2 * fromSeconds(scan_period_);
-  await(command_lockstep_, [&] {
-    queue_.callAvailable(ros::WallDuration(command_lockstep_.alive ? 0.002 : 0.0));
-    return command_stamp_ >= least && command_stamp_ > Stamp::zero();
+  // Without lockstep, a driver's answer to the scan before is already a sign of life.
+  const Stamp before = std::max(stamp - fromSeconds(1.5 * scan_period_), Stamp(1));
+  await(pilot_, command_subscriber_, [&] {
+    queue_.callAvailable(ros::WallDuration(pilot_.alive ? 0.002 : 0.0));
+    return pilot_.alive ? command_stamp_ >= stamp : driver_stamp_ >= before;
   });
 }
 
 void SimulatorRos::awaitBridge() {
-  await(bridge_lockstep_, [&] {
+  await(bridge_, odometry_subscriber_, [&] {
     if (bus_->count() > bridge_frames_) return true;
-    if (bridge_lockstep_.alive) bus_->wait(2);
+    if (bridge_.alive) bus_->wait(2);
     return bus_->count() > bridge_frames_;
   });
   bridge_frames_ = bus_->count();
+  // The bridge's copy of a command may come later than ours: until it does, in real time.
+  if (inLockstep() && overtakes(bus_->newest(), expected_stamp_)) {
+    ++late_commands_;
+    ros::WallDuration(toSeconds(kFramePeriod)).sleep();
+  }
+  expected_stamp_ = driver_stamp_;
+}
+
+// Without a healthy driver commands stem from no scan: they come with time, which must not wait for
+// them.
+void SimulatorRos::onCommand(const TruckCommand& message) {
+  command_stamp_ = toCore(message.header.stamp);
+  if (message.source == TruckCommand::SOURCE_NONE || message.source == TruckCommand::SOURCE_HOLD) {
+    pilot_.alive = false;
+  } else if (message.source != TruckCommand::SOURCE_DEAD_RECKONING) {
+    driver_stamp_ = command_stamp_;
+  }
 }
 
 void SimulatorRos::publishClock() {
@@ -341,18 +369,22 @@ bool SimulatorRos::onPause(std_srvs::SetBool::Request& request, std_srvs::SetBoo
 
 void SimulatorRos::fillStatus(Diagnostics::Status& status) {
   const auto& truth = simulator_->truth();
-  const bool lockstep = command_lockstep_.alive && bridge_lockstep_.alive;
+  const auto silent = [](const Partner& partner) { return !partner.alive && partner.given_up > 0; };
   if (truth.contacts > 0) {
     status.summary(Diagnostics::Status::ERROR, "a body touched something");
+  } else if (silent(pilot_) || silent(bridge_)) {
+    const char* name = silent(bridge_) ? bridge_.name : pilot_.name;
+    status.summary(Diagnostics::Status::WARN, std::string("in real time: the ") + name + " is silent");
   } else {
-    status.summary(Diagnostics::Status::OK, paused_    ? "paused"
-                                            : lockstep ? "in lockstep"
-                                                       : "in real time");
+    status.summary(Diagnostics::Status::OK, paused_        ? "paused"
+                                            : inLockstep() ? "in lockstep"
+                                                           : "in real time");
   }
   status.add("time [s]", toSeconds(simulator_->now()));
   status.add("contacts", truth.contacts);
-  status.add("scans not answered in time", command_lockstep_.misses);
-  status.add("frames not sent in time", bridge_lockstep_.misses);
+  status.add("commands late at the bridge", late_commands_);
+  status.add("pilot given up", pilot_.given_up);
+  status.add("bridge given up", bridge_.given_up);
 }
 
 }  // namespace tunnel_pilot::shell

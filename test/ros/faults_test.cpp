@@ -1,8 +1,10 @@
 // What breaks while the truck drives: every fault ends in a stop that says why, and nothing but an
 // operator's edge ends the stop.
+#include <diagnostic_msgs/DiagnosticArray.h>
 #include <gtest/gtest.h>
 #include <nodelet/NodeletLoad.h>
 #include <nodelet/NodeletUnload.h>
+#include <ros/network.h>
 #include <ros/ros.h>
 #include <rosgraph_msgs/Clock.h>
 #include <std_srvs/SetBool.h>
@@ -12,6 +14,7 @@
 #include <tunnel_pilot/TruckCommand.h>
 #include <tunnel_pilot/TruckStatus.h>
 #include <unistd.h>
+#include <xmlrpcpp/XmlRpcClient.h>
 
 #include <csignal>
 #include <functional>
@@ -33,6 +36,7 @@ class FaultsTest : public ::testing::Test {
                                            [this](const SimulatorTruth::ConstPtr& m) { truth = *m; });
     status_ = nh_.subscribe<TruckStatus>("truck_status", 50,
                                          [this](const TruckStatus::ConstPtr& m) { status = *m; });
+    diagnostics_ = nh_.subscribe("/diagnostics", 50, &FaultsTest::onDiagnostics, this);
     startBridge();
     engage();
   }
@@ -56,6 +60,41 @@ class FaultsTest : public ::testing::Test {
     kill(bridge_, signal);
     waitpid(bridge_, nullptr, 0);
     bridge_ = -1;
+  }
+
+  // As a machine does that has other things to do.
+  void holdUp(pid_t process, double seconds) {
+    kill(process, SIGSTOP);
+    spinUntil([] { return false; }, seconds);
+    kill(process, SIGCONT);
+  }
+
+  void expectToDriveThroughHoldUps(pid_t process) {
+    ASSERT_GT(process, 0);
+    for (const double seconds : {0.06, 0.2, 1.0, 0.2, 1.5}) {
+      holdUp(process, seconds);
+      spinUntil([] { return false; }, 0.2);
+      ASSERT_EQ(static_cast<int>(TruckStatus::STATE_ACTIVE), status.state) << status.reason_text;
+    }
+    EXPECT_GT(truth.speed, 1.0);
+  }
+
+  pid_t bridge() const { return bridge_; }
+
+  static pid_t processOf(const std::string& node) {
+    XmlRpc::XmlRpcValue call, answer, uri;
+    call[0] = ros::this_node::getName();
+    call[1] = node;
+    std::string host;
+    std::uint32_t port = 0;
+    if (!ros::master::execute("lookupNode", call, answer, uri, false) ||
+        !ros::network::splitURI(uri, host, port)) {
+      return -1;
+    }
+    XmlRpc::XmlRpcClient client(host.c_str(), static_cast<int>(port));
+    XmlRpc::XmlRpcValue caller;
+    caller[0] = ros::this_node::getName();
+    return client.execute("getPid", caller, answer) ? static_cast<int>(answer[2]) : -1;
   }
 
   bool spinUntil(const std::function<bool()>& done, double seconds = 20.0) {
@@ -95,19 +134,35 @@ class FaultsTest : public ::testing::Test {
   ros::NodeHandle nh_;
   SimulatorTruth truth;
   TruckStatus status;
+  std::string simulator_says;  // on /diagnostics
 
  private:
+  void onDiagnostics(const diagnostic_msgs::DiagnosticArray& message) {
+    for (const auto& told : message.status) {
+      if (told.name.find("simulator") != std::string::npos) simulator_says = told.message;
+    }
+  }
+
   pid_t bridge_ = -1;
-  ros::Subscriber truth_, status_;
+  ros::Subscriber truth_, status_, diagnostics_;
 };
 
 TEST_F(FaultsTest, KilledBridgeStopsTheTruckByTheTrucksOwnTimeout) {
   endBridge(SIGKILL);
   EXPECT_TRUE(spinUntil([&] { return std::abs(truth.speed) < kStandstill; }));
   EXPECT_EQ(0u, truth.contacts);
+  EXPECT_EQ("in real time: the bridge is silent", simulator_says);
   startBridge();  // a bridge that comes back does not drive on by itself
   ASSERT_TRUE(spinUntil([&] { return status.state == TruckStatus::STATE_STANDBY; }));
   EXPECT_LT(std::abs(truth.speed), kStandstill);
+}
+
+TEST_F(FaultsTest, ABridgeHeldUpByABusyMachineDoesNotStopTheTruck) {
+  expectToDriveThroughHoldUps(bridge());
+}
+
+TEST_F(FaultsTest, APilotHeldUpByABusyMachineDoesNotStopTheTruck) {
+  expectToDriveThroughHoldUps(processOf("/pilot_manager"));
 }
 
 TEST_F(FaultsTest, SilentScanFilterStopsTheTruck) {

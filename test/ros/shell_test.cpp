@@ -298,6 +298,7 @@ TEST(BusTap, CountsBeforeFramesAreReadAndLosesNone) {
   frame.id = 0x111;
   sender->send(frame);
   EXPECT_EQ(1u, tap.count());
+  EXPECT_EQ(0x110u, tap.newest().id);
   EXPECT_EQ(0x110u, tap.receive()->id);
   EXPECT_EQ(0x111u, tap.receive()->id);
   EXPECT_FALSE(tap.receive().has_value());

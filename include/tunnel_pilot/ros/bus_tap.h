@@ -11,7 +11,8 @@
 namespace tunnel_pilot::shell {
 
 /// A bus whose incoming frames can be counted before their reader takes them: how the simulator in
-/// lockstep sees that the bridge has spoken. At most kQueueLength frames wait; what comes then is lost.
+/// lockstep sees that the bridge has spoken, and what it knew. At most kQueueLength frames wait; what
+/// comes then is lost.
 class BusTap : public can::Bus {
  public:
   static constexpr std::size_t kQueueLength = 4096;
@@ -29,6 +30,9 @@ class BusTap : public can::Bus {
   /// Takes in what waits on the bus, and returns how many counted frames have come since the start.
   std::uint64_t count();
 
+  /// The counted frame that came last.
+  const can::Frame& newest() const { return newest_; }
+
   /// Sleeps until something waits on the bus, at most `milliseconds` of steady time.
   void wait(int milliseconds) const;
 
@@ -37,6 +41,7 @@ class BusTap : public can::Bus {
   std::uint32_t counted_;
   std::deque<can::Frame> waiting_;
   std::uint64_t count_ = 0;
+  can::Frame newest_;
 };
 
 }  // namespace tunnel_pilot::shell

@@ -39,10 +39,14 @@ class Pace {
 /// rest; time goes on) and ~pause (std_srvs/SetBool: time stands still). Contacts of either body are
 /// logged and counted.
 ///
-/// Lockstep: after each scan time stands still until `command` carries the scan's stamp, and at each
-/// 20 ms until the bridge has sent its frame, but at most 0.25 s of steady time, which counts as a miss.
-/// After kMissesAllowed misses in a row, and before the pilot's first answer, it does not wait and runs
-/// no faster than real time. `real_time_factor` holds it back; 0 runs as fast as the pilot answers.
+/// Lockstep: time stands still after each scan until `command` carries the scan's stamp, and at each
+/// 20 ms until the bridge has sent its frame, however long that takes; where that frame stems from an
+/// older scan than the command of 20 ms ago, the next 20 ms take as long. So what the pilot judges by
+/// its age does not depend on how busy the machine is. Who leaves, or is silent for kLongestSilence, is
+/// given up, which is logged and told on /diagnostics. While pilot or bridge is given up, has not
+/// answered yet, or no driver steers, it is not waited for and time runs no faster than real time; its
+/// next answer brings the lockstep back. `real_time_factor` holds the lockstep back; 0 runs as fast as
+/// the pilot answers.
 ///
 /// Parameters: config/simulator.yaml, and `truck_file`, `truck_controller_file`, `world_file` (paths),
 /// `bus` (name of the embedded bus), `load` (empty, loaded), `seed`, `reversed` (true: the other way
@@ -55,13 +59,13 @@ class SimulatorRos {
   void advance();
 
  private:
-  static constexpr int kMissesAllowed = 3;
+  static constexpr double kLongestSilence = 3.0;  // [s] steady time
 
-  // Waits for an answer of the pilot, and what came of it.
-  struct Lockstep {
+  // One whose answers time waits for.
+  struct Partner {
+    const char* name;
     bool alive = false;  // answered lately
-    int misses_in_row = 0;
-    unsigned long misses = 0;
+    unsigned long given_up = 0;
   };
 
   void configure(const ros::NodeHandle& private_nh);
@@ -71,13 +75,15 @@ class SimulatorRos {
   void publishTruth();
   void publishWalls();
   void publishObstacles();
+  void onCommand(const TruckCommand& message);
   void onOdometry(const nav_msgs::Odometry& message);
   bool onReset(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
   bool onPause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
   template <class Answered>
-  void await(Lockstep& lockstep, Answered answered);
+  void await(Partner& partner, const ros::Subscriber& topic, Answered answered);
   void awaitCommand(Stamp stamp);
   void awaitBridge();
+  bool inLockstep() const { return pilot_.alive && bridge_.alive; }
   void fillStatus(Diagnostics::Status& status);
 
   ros::CallbackQueue queue_;
@@ -87,9 +93,12 @@ class SimulatorRos {
   double real_time_factor_ = 1.0;
   bool paused_ = false;
   Pace pace_;
-  Lockstep command_lockstep_, bridge_lockstep_;
+  Partner pilot_{"pilot"}, bridge_{"bridge"};
   Stamp command_stamp_{};            // of the newest `command`
+  Stamp driver_stamp_{};             // of the newest that a driver steers
+  Stamp expected_stamp_{};           // that the bridge's next frame must know
   std::uint64_t bridge_frames_ = 0;  // at the last wait
+  unsigned long late_commands_ = 0;
   drivers::MotionHistory true_motion_;
 
   ros::Publisher clock_publisher_, scan_publisher_, truth_publisher_, walls_publisher_,
