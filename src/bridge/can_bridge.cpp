@@ -98,7 +98,7 @@ void CanBridge::rejectCommand(const Command& command, const std::string& why, St
   ++status_.commands_rejected;
   status_.command_rejection = why;
   if (!command.stop) return;
-  raise(Event::kCommandStop, now);
+  raise(Event::kCommandStop, now, command.reason);
   sendIfDue(now);
 }
 
@@ -228,12 +228,14 @@ std::optional<Event> CanBridge::degradation(Stamp now) const {
 // -------- state machine
 
 void CanBridge::raise(Event event, Stamp now) {
+  raise(event, now, command_ ? command_->command.reason : Reason::kNoSource);
+}
+
+// `carried` is the command's own reason, told where the table has none.
+void CanBridge::raise(Event event, Stamp now, Reason carried) {
   const Transition* row = findTransition(status_.state, event);
   if (row == nullptr || (row->to == status_.state)) return;
-  if (row->to != S::kStopped) {
-    const Reason carried = command_ ? command_->command.reason : Reason::kNoSource;
-    status_.reason = row->reason.value_or(carried);
-  }
+  if (row->to != S::kStopped) status_.reason = row->reason.value_or(carried);
   status_.state = row->to;
   ++status_.transitions;
   entered_ = now;

@@ -79,7 +79,7 @@ void LapMonitor::engage() {
   engaged_ = call.response.success;
   if (!engaged_) return;
   engaged_at_ = heard_ = ros::SteadyTime::now();
-  first_ = last_;
+  lap_begin_ = ros::Time::now();
 }
 
 void LapMonitor::onTruckStatus(const TruckStatus& message) {
@@ -94,7 +94,10 @@ void LapMonitor::onTruth(const SimulatorTruth& message) {
   if (engaged_ && !passed_) checkLap(message);
 }
 
+// Begins with the first truth of after the engagement: older ones may still have been queued.
 void LapMonitor::checkLap(const SimulatorTruth& message) {
+  if (!first_ && message.header.stamp < lap_begin_) return;
+  if (!first_) first_ = message;
   track_.push_back(toSample(message));
   const double time = (message.header.stamp - first_->header.stamp).toSec();
   if (!message.on_design_line || message.lap_length <= 0.0) {
@@ -106,7 +109,7 @@ void LapMonitor::checkLap(const SimulatorTruth& message) {
 }
 
 void LapMonitor::printProgress() const {
-  if (!engaged_) {
+  if (!first_) {
     std::printf("waiting to be engaged: %s\n", refusal_.c_str());
   } else {
     std::printf("lap %3.0f %%  %5.1f s  %4.2f m/s  offset %+5.2f m  clearance %4.2f m  %s\n",

@@ -167,9 +167,11 @@ TEST_P(RefusedCommand, StopsThoughRefusedWhenItAsksForAStop) {
   bad.sequence = 1u << 20;
   GetParam()(bad, rig.now);
   bad.stop = true;
+  bad.reason = supervision::Reason::kObstacle;
   rig.judge.stopAsked(rig.now);
   rig.bridge->setCommand(bad, rig.now);
   EXPECT_EQ(rig.state(), SafetyState::kStopping);
+  EXPECT_EQ(rig.bridge->status().reason, supervision::Reason::kObstacle);
   rig.run(0.3);
 }
 

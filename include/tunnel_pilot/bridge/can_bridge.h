@@ -111,6 +111,7 @@ class CanBridge {
   void watchProgress(Stamp now);
   void watchSteering(Stamp now);
   void raise(Event event, Stamp now);
+  void raise(Event event, Stamp now, supervision::Reason carried);
   std::optional<std::string> whyUnhealthy(Stamp now) const;
 
   bool standsStill(Stamp now) const;

@@ -32,7 +32,8 @@ LapMonitorParameters loadLapMonitor(config::Node node);
 /// lateral_rms_m, lateral_max_m, heading_mean_deg, clearance_min_m, contacts, real_time_factor and,
 /// after a failure, reason. It passes with one whole lap, no contact and the lateral goals kept.
 /// Subscribes `truth`, `truck_status`, `arbiter_state`. Parameters: config/lap_monitor.yaml and
-/// `verdict_file`, which gets that line (-, or what cannot be written: standard output). Throws config::ConfigError.
+/// `verdict_file`, which gets that line (-, or what cannot be written: standard output). Throws
+/// config::ConfigError.
 class LapMonitor {
  public:
   LapMonitor(ros::NodeHandle nh, ros::NodeHandle private_nh);
@@ -64,6 +65,7 @@ class LapMonitor {
   std::string reason_;  // the arbiter's, in words
   ros::SteadyTime started_, engaged_at_, heard_;
   int ticks_ = 0;
+  ros::Time lap_begin_;
   std::optional<SimulatorTruth> first_, last_;
   std::vector<simulation::TrackSample> track_;
   std::optional<bool> passed_;
