@@ -100,8 +100,9 @@ const Tunnel& CenterlineEstimator::update(const Walls& walls, const std::optiona
     before_.clear();
     nodes_ = measured_;
   }
-  fitPath();
-  if (!isPlausible()) {
+  const bool enough = nodes_.size() >= kFewestInFit;  // or no parabola goes through them
+  if (enough) fitPath();
+  if (!enough || !isPlausible()) {
     disbelieve();
     return refuse(TunnelReason::kPoorFit);
   }
@@ -364,7 +365,9 @@ bool CenterlineEstimator::isPlausible() {
       break;
     }
   }
-  return path_.size() > 1 && path_.back().s - path_.front().s >= parameters_.length_min;
+  // In whole samples, as rounding must not decide about a path that is just long enough.
+  return path_.size() > 1 &&
+         path_.back().s - path_.front().s + 0.5 * kCurveStep >= parameters_.length_min;
 }
 
 // Back to beside the reference point, at the first sample's curvature.
