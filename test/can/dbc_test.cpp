@@ -86,7 +86,7 @@ TEST(Dbc, VectorsAreWhatCantoolsMakesOfIt) {
   const char* chosen = std::getenv("TUNNEL_PILOT_CANTOOLS_PYTHON");  // a python3 that has cantools
   const std::string python = chosen != nullptr ? chosen : "python3";
   const std::string command =
-      python + " " + TUNNEL_PILOT_SOURCE_DIR + "/test/can/make_vectors.py --check";
+      "'" + python + "' '" + TUNNEL_PILOT_SOURCE_DIR + "/test/can/make_vectors.py' --check";
   const int status = std::system(command.c_str());
   ASSERT_TRUE(WIFEXITED(status));
   if (WEXITSTATUS(status) == 77) {
