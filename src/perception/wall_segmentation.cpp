@@ -205,11 +205,12 @@ void WallSegmentation::Impl::group(const pcl::PointCloud<pcl::PointXYZ>& cloud,
       if (groups.size() == PointGrid::kMaxGroups) break;
       x0 = point.x;
       y0 = point.y;
+      if (!groups.empty()) groups.back().last = count;
       groups.push_back({x0, y0, count, count});
     }
     order[static_cast<std::size_t>(count++)] = index;
-    groups.back().last = count;
   }
+  if (!groups.empty()) groups.back().last = count;
   order.resize(static_cast<std::size_t>(count));
 }
 

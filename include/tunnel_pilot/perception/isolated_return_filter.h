@@ -127,7 +127,8 @@ class IsolatedReturnFilter : public pcl::FilterIndices<PointT> {
     }
     for (std::size_t i = 0; i < size; ++i) {
       // Infinite coordinates give infinite reaches; those of NaN compare false.
-      if (!(reach_squared_[i] <= std::numeric_limits<float>::max())) neighbors_[i] = kNotFinite;
+      const bool finite = reach_squared_[i] <= std::numeric_limits<float>::max();
+      neighbors_[i] = finite ? neighbors_[i] : kNotFinite;
     }
   }
 
