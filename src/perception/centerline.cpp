@@ -365,9 +365,7 @@ bool CenterlineEstimator::isPlausible() {
       break;
     }
   }
-  // In whole samples, as rounding must not decide about a path that is just long enough.
-  return path_.size() > 1 &&
-         path_.back().s - path_.front().s + 0.5 * kCurveStep >= parameters_.length_min;
+  return path_.size() > 1 && path_.back().s - path_.front().s >= parameters_.length_min;
 }
 
 // Back to beside the reference point, at the first sample's curvature.
