@@ -104,9 +104,9 @@ struct WallSegmentation::Impl {
   CorridorSmoother smoother;
   PointGrid grid;
   std::vector<PointGroup> groups;
-  std::vector<int> order;                         // finite points of the input, as indices
-  std::vector<int> inliers;                       // as long as ever needed, so that nothing is cleared
-  std::array<std::vector<std::int8_t>, 2> taken;  // by side and group: the node it was taken for, or -1
+  std::vector<int> order;                          // finite points of the input, as indices
+  std::vector<int> inliers;                        // as long as ever needed, so that nothing is cleared
+  std::array<std::vector<std::int16_t>, 2> taken;  // by side and group: the node it was taken for, or -1
   std::array<std::vector<float>, 2> seen;  // by side and node: share of the slice that shows the wall
 
   void group(const pcl::PointCloud<pcl::PointXYZ>& cloud, const std::vector<int>& indices);
@@ -443,8 +443,8 @@ WallSlice WallSegmentation::Impl::lookForWall(std::size_t side, double gate, con
                                               bool take) {
   const CorridorNode& node = smoother.last();
   const double middle = kSides[side] * node.half_width;
-  std::vector<std::int8_t>& mine = taken[side];
-  const auto at = static_cast<std::int8_t>(smoother.size() - 1);
+  std::vector<std::int16_t>& mine = taken[side];
+  const auto at = static_cast<std::int16_t>(smoother.size() - 1);
   int count = 0;
   float sum_along = 0.0F;
   float sum_along_squared = 0.0F;
@@ -570,7 +570,7 @@ void WallSegmentation::Impl::collectInliers(const pcl::PointCloud<pcl::PointXYZ>
     lines[i] = {frameOf(n), static_cast<float>(offset), static_cast<float>(0.5 * bend)};
   }
   const auto reach = static_cast<float>(p.inlier_distance);
-  const std::vector<std::int8_t>& node_of = taken[side];
+  const std::vector<std::int16_t>& node_of = taken[side];
   inliers.resize(std::max(inliers.size(), order.size()));
   std::size_t count = 0;
   float sum = 0.0F;
