@@ -230,12 +230,13 @@ bool reset() {
 void driveOff() {
   truck().spoil = {};
   ASSERT_TRUE(truck().runUntil([] { return truck().commands > 0; }, 60.0)) << "no command ever came";
-  // A busy machine may hold up the pilot, which then slows down to 1.5 m/s or stops for a while.
-  for (int i = 0; i < 60 && (truck().speed < 1.3 || truck().command.stop); ++i) {
+  // A busy machine may hold up the pilot, which then slows down or stops for a while: time enough to
+  // recover.
+  for (int i = 0; i < 80 && (truck().speed < 1.5 || truck().command.stop); ++i) {
     truck().run(0.5);
     if (truck().command.stop) reset();
   }
-  ASSERT_GE(truck().speed, 1.3) << truck().state.reason_text;
+  ASSERT_GE(truck().speed, 1.5) << truck().state.reason_text;
   ASSERT_FALSE(truck().command.stop) << truck().state.reason_text;
 }
 

@@ -43,7 +43,7 @@ struct ArbiterParameters {
   double recovery_time;         ///< of health before driving fast again [s]
   double degraded_speed;        ///< [m/s]
   double dead_reckoning_age;    ///< oldest centerline a stop is steered along [s]
-  int obstacle_scans;           ///< with an obstruction, one after the other, that stop
+  int obstacle_scans;           ///< one after the other must show an obstacle to slow down or stop
   double tracking_tolerance;    ///< articulation from its expected answer [rad]
   double tracking_time;         ///< [s]
   int limit_hits;               ///< of angle or lateral acceleration within recovery_time: slowly
