@@ -76,6 +76,8 @@ class PreviewPlanner {
                     const YawResponse& believed, double step) const;
 
   double cost() const { return cost_; }  ///< of the last plan
+  /// The planned state `time` [s] after the last plan's start, interpolated; clamped to the horizon.
+  PathState plannedAt(double time) const;
 
  private:
   using Vector = Eigen::Vector4d;  ///< (offset, heading error, articulation, command)
