@@ -8,14 +8,14 @@
 namespace tunnel_pilot::neural {
 namespace {
 
-constexpr double kReach = 2.5;           // of a fit, in the bell's standard deviations
-constexpr double kSeparate = 3.0;        // distance of separate bells, likewise
-constexpr double kLowest = 0.15;         // height of what counts as a bell
-constexpr double kSecondShare = 0.4;     // of the highest bell's height
-constexpr double kValley = 0.75;         // between separate bells, of the lower one's output
+constexpr double kReach = 2.5;        // of a fit, in the bell's standard deviations
+constexpr double kSeparate = 3.0;     // distance of separate bells, likewise
+constexpr double kLowest = 0.15;      // height of what counts as a bell
+constexpr double kSecondShare = 0.4;  // of the highest bell's height
+constexpr double kValley = 0.75;      // between separate bells, of the lower one's output
 constexpr int kMaxPeaks = 4;
 constexpr int kMaxSteps = 20;
-constexpr double kTolerance = 1e-12;     // of the bell's place, in spacings
+constexpr double kTolerance = 1e-12;  // of the bell's place, in spacings
 
 using Values = std::array<double, GaussianCode::kMaxNodes>;
 
@@ -60,8 +60,8 @@ void GaussianCode::encode(double value, double* targets) const {
   }
 }
 
-// The node where a bell explains most, and its height there; unlike the highest output the node is hardly
-// moved by noise. Offset after offset, all nodes at once: that is what makes vector instructions.
+// The node where a bell explains most, and its height there; unlike the highest output the node is
+// hardly moved by noise. Offset after offset, all nodes at once: that is what makes vector instructions.
 GaussianCode::Best GaussianCode::bestNode(const double* outputs) const {
   Values sums{};
   for (std::size_t d = 0; d <= reach_; ++d) {
@@ -159,12 +159,13 @@ int GaussianCode::countPeaks(const double* outputs, double* rest, const Fit& fir
   for (int tries = 0; tries < kMaxPeaks && count < kMaxPeaks; ++tries) {
     const auto [node, height] = bestNode(rest);
     if (height < std::max(kLowest, kSecondShare * first.height)) break;
-    const bool separate = std::all_of(found.begin(), found.begin() + count, [&, next = node](std::size_t other) {
-      const auto [left, right] = std::minmax(other, next);
-      const double valley = *std::min_element(outputs + left, outputs + right + 1);
-      return static_cast<double>(right - left) >= apart &&
-             valley < kValley * std::min(outputs[left], outputs[right]);
-    });
+    const bool separate =
+        std::all_of(found.begin(), found.begin() + count, [&, next = node](std::size_t other) {
+          const auto [left, right] = std::minmax(other, next);
+          const double valley = *std::min_element(outputs + left, outputs + right + 1);
+          return static_cast<double>(right - left) >= apart &&
+                 valley < kValley * std::min(outputs[left], outputs[right]);
+        });
     if (separate) found[static_cast<std::size_t>(count++)] = node;
     subtract(rest, node, static_cast<double>(node), height);
   }

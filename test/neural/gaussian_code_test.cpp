@@ -28,7 +28,9 @@ std::vector<double> sum(std::vector<double> a, const std::vector<double>& b) {
   return a;
 }
 
-GaussianCode::Decoded decoded(const std::vector<double>& outputs) { return kCode.decode(outputs.data()); }
+GaussianCode::Decoded decoded(const std::vector<double>& outputs) {
+  return kCode.decode(outputs.data());
+}
 
 double centroid(const std::vector<double>& p) {
   double weighted = 0.0;
@@ -191,8 +193,9 @@ TEST(GaussianCode, OutputsWithoutABellGiveNoConfidence) {
 }
 
 TEST(GaussianCode, NonFiniteOutputsGiveNoConfidenceAndNoPeak) {
-  for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
-                          -std::numeric_limits<float>::infinity()}) {
+  for (const float bad :
+       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
+        -std::numeric_limits<float>::infinity()}) {
     for (const std::size_t at : {std::size_t{0}, std::size_t{15}, kNodes - 1}) {
       const std::vector<double> clean = encoded(0.0);
       std::vector<float> outputs(clean.begin(), clean.end());
@@ -219,7 +222,8 @@ TEST(GaussianCode, AnyOutputsGiveFiniteResultsWithinTheirRanges) {
     ASSERT_TRUE(std::isfinite(result.height) && std::isfinite(result.residual));
     ASSERT_TRUE(result.confidence >= 0.0 && result.confidence <= 1.0);
     ASSERT_TRUE(result.peaks >= 0 && result.peaks <= 4);
-    ASSERT_TRUE(result.peaks == 0 || (result.value >= -45.0 && result.value <= code.node(code.nodes() - 1)));
+    ASSERT_TRUE(result.peaks == 0 ||
+                (result.value >= -45.0 && result.value <= code.node(code.nodes() - 1)));
   }
 }
 

@@ -37,9 +37,9 @@ class GaussianCode {
   Decoded decode(const float* outputs) const;
   Decoded decode(const double* outputs) const;
   /// The decoded value, and its derivatives by the outputs, exact for a fit inside of the grid; all zero
-  /// where the value is held at the grid's end or there is nothing to fit. For training through the code.
-  /// (Half-way between nodes the fit's window moves on by one: noisy outputs make a step of about a
-  /// thousandth of a spacing there, which the derivatives do not tell.)
+  /// where the value is held at the grid's end or there is nothing to fit. For training through the
+  /// code. (Half-way between nodes the fit's window moves on by one: noisy outputs make a step of about
+  /// a thousandth of a spacing there, which the derivatives do not tell.)
   double decode(const double* outputs, double* derivatives) const;
 
  private:
@@ -51,7 +51,7 @@ class GaussianCode {
     std::size_t best = 0;  ///< node
     double place = 0.0;    ///< of the bell, in spacings from the first node
     double height = 0.0;
-    bool inside = false;   ///< a true maximum, not the grid's end
+    bool inside = false;  ///< a true maximum, not the grid's end
   };
   struct Sums {
     double a = 0.0, a1 = 0.0, a2 = 0.0;  ///< A and its derivatives by the bell's place
@@ -72,9 +72,9 @@ class GaussianCode {
 
   std::size_t nodes_;
   double first_, spacing_, width_;
-  std::size_t reach_;            ///< nodes on either side that take part in a fit
-  std::vector<double> bell_;     ///< by distance in nodes, 0..reach
-  std::vector<double> energy_;   ///< of a bell at each node, as far as the grid reaches
+  std::size_t reach_;           ///< nodes on either side that take part in a fit
+  std::vector<double> bell_;    ///< by distance in nodes, 0..reach
+  std::vector<double> energy_;  ///< of a bell at each node, as far as the grid reaches
 };
 
 }  // namespace tunnel_pilot::neural
