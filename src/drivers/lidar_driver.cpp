@@ -1,20 +1,32 @@
 #include "tunnel_pilot/drivers/lidar_driver.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
+#include <utility>
+
+#include "tunnel_pilot/drivers/motion_history.h"
 
 namespace tunnel_pilot::drivers {
 namespace {
 
 using neural::InputGroup;
 
-constexpr float kNothing = 1.0F / 40.0F;  // [1/m] of beams that met nothing within the lidar's reach
+// The members of TruckInputs by the names that a network's file gives them.
+constexpr std::array<std::pair<const char*, double TruckInputs::*>, 5> kTruckInputs = {{
+    {"articulation", &TruckInputs::articulation},
+    {"articulation_ahead", &TruckInputs::articulation_ahead},
+    {"speed", &TruckInputs::speed},
+    {"yaw_gain", &TruckInputs::yaw_gain},
+    {"yaw_disturbance", &TruckInputs::yaw_disturbance},
+}};
 
-double valueOf(const std::string& meaning, const Motion& motion) {
-  if (meaning == "articulation") return motion.articulation;
-  if (meaning == "articulation_rate") return motion.articulation_rate;
-  return motion.speed;
+double TruckInputs::*memberOf(const std::string& meaning) {
+  for (const auto& [name, member] : kTruckInputs) {
+    if (meaning == name) return member;
+  }
+  return nullptr;
 }
 
 double scaled(const InputGroup& group, double value) {
@@ -39,6 +51,7 @@ LidarDriverParameters loadLidarDriver(config::Node node, const std::string& fold
   p.network = (std::filesystem::path(folder) / node.text("network")).lexically_normal().string();
   p.speed = node.number("speed", "m/s", 0.1, 15.0);
   p.max_scan_age = node.number("max_scan_age", "s", 0.05, 1.0);
+  p.steering = loadSteeringEstimator(node);
   node.finish();
   return p;
 }
@@ -47,8 +60,7 @@ LidarInputs::LidarInputs(const std::vector<InputGroup>& groups, const std::strin
     : groups_(groups), inverse_(kBeams) {
   for (const InputGroup& group : groups) {
     const bool ranges = group.meaning == "ranges" && group.count == kBeams;
-    const bool single = group.count == 1 && (group.meaning == "articulation" || group.meaning == "speed" ||
-                                             group.meaning == "articulation_rate");
+    const bool single = group.count == 1 && memberOf(group.meaning) != nullptr;
     if (!ranges && !single) {
       throw config::ConfigError(source + ": a lidar driver has no " + std::to_string(group.count) +
                                 " inputs called '" + group.meaning + "'");
@@ -57,7 +69,7 @@ LidarInputs::LidarInputs(const std::vector<InputGroup>& groups, const std::strin
   }
 }
 
-bool LidarInputs::fill(const std::vector<float>& ranges, const Motion& motion, float* inputs) {
+bool LidarInputs::fill(const std::vector<float>& ranges, const TruckInputs& truck, float* inputs) {
   if (ranges.size() != kBeams || !bridgeGaps(ranges)) return false;
   for (const InputGroup& group : groups_) {
     if (group.meaning == "ranges") {
@@ -71,7 +83,7 @@ bool LidarInputs::fill(const std::vector<float>& ranges, const Motion& motion, f
         *inputs++ = inverse ? scale * x : (1.0F / x - offset) / scale;
       }
     } else {
-      const double value = valueOf(group.meaning, motion);
+      const double value = truck.*memberOf(group.meaning);
       if (!std::isfinite(value)) return false;
       *inputs++ = static_cast<float>(scaled(group, value));
     }
@@ -100,11 +112,13 @@ bool LidarInputs::bridgeGaps(const std::vector<float>& ranges) {
   return true;
 }
 
-LidarDriver::LidarDriver(const LidarDriverParameters& parameters, const neural::NetworkFile& network)
+LidarDriver::LidarDriver(const LidarDriverParameters& parameters,
+                         const vehicle::TruckGeometry& geometry, const neural::NetworkFile& network)
     : parameters_(parameters),
       inputs_(network.inputs, network.name),
       inference_(network.network),
       code_(codeOf(network)),
+      steering_(parameters.steering, geometry),
       model_(network.name + " " + network.sha256),
       values_(inputs_.size()),
       outputs_(network.network.outputs()) {
@@ -113,16 +127,23 @@ LidarDriver::LidarDriver(const LidarDriverParameters& parameters, const neural::
   }
 }
 
+void LidarDriver::reset() { steering_.reset(); }
+
 Proposal LidarDriver::propose(const geometry::Scan& scan, const Motion& motion, Stamp now) {
   Proposal proposal;
   proposal.stamp = scan.stamp;
   const Stamp age = now - scan.stamp;
   if (age < Stamp::zero() || toSeconds(age) > parameters_.max_scan_age) return proposal;
-  if (!inputs_.fill(scan.ranges, motion, values_.data())) return proposal;
+  if (!isFinite(motion)) return proposal;
+  steering_.observe(motion);
+  const double meets = steering_.articulationAhead(now);
+  truck_ = {steering_.motion().articulation, meets, motion.speed, steering_.learned().gain,
+            steering_.learned().disturbance};
+  if (!inputs_.fill(scan.ranges, truck_, values_.data())) return proposal;
   inference_.run(values_.data(), outputs_.data());
   const neural::GaussianCode::Decoded decoded = code_.decode(outputs_.data());
   proposal.valid = decoded.peaks > 0;
-  proposal.articulation_angle = decoded.value;
+  proposal.articulation_angle = steering_.give(decoded.value, meets, now);
   proposal.speed = parameters_.speed;
   proposal.confidence = decoded.confidence;
   return proposal;

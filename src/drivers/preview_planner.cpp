@@ -8,14 +8,8 @@
 namespace tunnel_pilot::drivers {
 namespace {
 
-// Beyond this the path-error form would divide by zero: the path's centre of curvature is reached.
-double curvatureRoom(double curvature, double offset) { return std::max(0.2, 1.0 - curvature * offset); }
-
 // A sweep whose corrections do not help even at this share is not followed.
 constexpr double kLeastCorrection = 0.2;
-
-// Share of the command's distance that a first-order lag covers in one step.
-double lagShare(double step, double lag) { return 1.0 - std::exp(-step / lag); }
 
 }  // namespace
 
@@ -29,38 +23,10 @@ PreviewPlanner::PreviewPlanner(const TruckResponse& truck, const PreviewWeights&
 
 void PreviewPlanner::reset() { rates_.fill(0.0); }
 
-PathState PreviewPlanner::advance(const PathState& now, double command_rate, double speed,
-                                  double curvature, const YawResponse& believed, double step) const {
-  return advance(now, std::cos(now.heading_error), command_rate, speed, curvature, believed, step);
-}
-
 PathState PreviewPlanner::advance(const PathState& now, double cos_heading_error, double command_rate,
-                                  double speed, double curvature, const YawResponse& believed,
-                                  double step) const {
-  const double share = step == step_ ? share_ : lagShare(step, truck_.lag);
-  const double most = truck_.max_rate * step;
-  const double turn_of_hinge =
-      std::clamp(share * (now.command + 0.5 * command_rate * step - now.articulation), -most, most);
-  const double middle = now.articulation + 0.5 * turn_of_hinge;
-  const double travel = speed * step;
-  const double arm =
-      truck_.geometry.front_axle_to_hinge * std::cos(middle) + truck_.geometry.rear_axle_to_hinge;
-  const double turn =
-      (believed.gain * travel * std::sin(middle) + truck_.geometry.rear_axle_to_hinge * turn_of_hinge) /
-          arm +
-      travel * believed.disturbance;
-  const double slip = -truck_.slip_compliance * speed * turn / step +
-                      (believed.gain - 1.0) * std::sin(middle) / (1.0 + std::cos(middle));
-  const double advance_on_path = travel * cos_heading_error / curvatureRoom(curvature, now.offset);
-  const double error_growth = turn - curvature * advance_on_path;
-  PathState next;
-  next.s = now.s + advance_on_path;
-  next.offset = now.offset + travel * std::sin(now.heading_error + 0.5 * error_growth + slip);
-  next.heading_error = now.heading_error + error_growth;
-  next.articulation = now.articulation + turn_of_hinge;
-  next.command =
-      std::clamp(now.command + command_rate * step, -truck_.max_articulation, truck_.max_articulation);
-  return next;
+                                  double speed, double curvature, const YawResponse& believed) const {
+  return advancedOnPath(truck_, now, cos_heading_error, command_rate, speed, curvature, believed, step_,
+                        share_);
 }
 
 PreviewPlanner::Linear PreviewPlanner::linearise(const PathState& now, double rate, double speed,
@@ -142,7 +108,7 @@ double PreviewPlanner::roll(const PathState& now, const geometry::Path& path, do
     const double next_heading = cursor.headingAt(state.s + ahead);
     curvatures_[k] = (next_heading - heading) / ahead;
     states_[k] = state;
-    state = advance(state, cosine, rates_[k], speed, curvatures_[k], believed, step_);
+    state = advance(state, cosine, rates_[k], speed, curvatures_[k], believed);
     heading = cursor.headingAt(state.s);
     const double factor = k + 1 == kStages ? weights_.terminal : 1.0;
     sum +=

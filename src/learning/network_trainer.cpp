@@ -12,6 +12,7 @@
 
 #include "tunnel_pilot/drivers/lidar_driver.h"
 #include "tunnel_pilot/learning/input_projection.h"
+#include "tunnel_pilot/neural/adam.h"
 #include "tunnel_pilot/neural/batch_pass.h"
 #include "tunnel_pilot/neural/gaussian_code.h"
 #include "tunnel_pilot/simulation/random.h"
@@ -38,14 +39,15 @@ Eigen::MatrixXf inputsOf(const neural::NetworkFile& file, const DataSet& example
   std::vector<float> ranges;
   for (std::size_t i = 0; i < examples.size(); ++i) {
     const Example& example = examples[i];
-    drivers::Motion motion;
     const double sign = mirrored ? -1.0 : 1.0;
-    motion.articulation = sign * static_cast<double>(example.articulation);
-    motion.articulation_rate = sign * static_cast<double>(example.articulation_rate);
-    motion.speed = static_cast<double>(example.speed);
+    const drivers::TruckInputs truck{sign * static_cast<double>(example.articulation),
+                                     sign * static_cast<double>(example.articulation_ahead),
+                                     static_cast<double>(example.speed),
+                                     static_cast<double>(example.yaw_gain),
+                                     sign * static_cast<double>(example.yaw_disturbance)};
     ranges = example.ranges;
     if (mirrored) std::reverse(ranges.begin(), ranges.end());
-    if (!inputs.fill(ranges, motion, columns.col(static_cast<Eigen::Index>(i)).data()))
+    if (!inputs.fill(ranges, truck, columns.col(static_cast<Eigen::Index>(i)).data()))
       throw std::runtime_error("an example without usable ranges");
   }
   return columns;
@@ -60,6 +62,8 @@ class Worker {
         decode_weight_(decode_weight),
         targets_(file.network.outputs()),
         outputs_(file.network.outputs()),
+        derivatives_(file.network.outputs()),
+        spacing_(file.output.spacing),
         gradient_(network.parameters().size()) {}
 
   void load(std::size_t lane, const float* inputs, std::size_t count, double label) {
@@ -88,42 +92,25 @@ class Worker {
     for (std::size_t o = 0; o < targets_.size(); ++o) {
       const double y = std::clamp(pass_.output(o)[lane], kLeastProbability, 1.0 - kLeastProbability);
       const double t = targets_[o];
-      outputs_[o] = static_cast<float>(y);
+      outputs_[o] = y;
       const double floor = t > 0.0 && t < 1.0 ? t * std::log(t) + (1.0 - t) * std::log(1.0 - t) : 0.0;
       loss.entropy += floor - t * std::log(y) - (1.0 - t) * std::log(1.0 - y);
       pass_.outputGradient(o)[lane] = (y - t) / (y * (1.0 - y));
     }
-    const auto decoded = code_.decode(outputs_.data());
-    const double error = decoded.value - labels_[lane];
+    const double error = code_.decode(outputs_.data(), derivatives_.data()) - labels_[lane];
     loss.squares += error * error;
+    const double pull = decode_weight_ * error / (spacing_ * spacing_);
+    for (std::size_t o = 0; o < targets_.size(); ++o) pass_.outputGradient(o)[lane] += pull * derivatives_[o];
   }
 
   BatchPass pass_;
   neural::GaussianCode code_;
   double decode_weight_;
   std::vector<double> targets_;
-  std::vector<float> outputs_;
+  std::vector<double> outputs_, derivatives_;
+  double spacing_;
   std::array<double, kLanes> labels_{};
   std::vector<double> gradient_;
-};
-
-// Adam (Kingma & Ba 2015) with decoupled weight decay.
-class Adam {
- public:
-  explicit Adam(std::size_t size) : mean_(size), square_(size) {}
-  void step(std::vector<double>& p, const std::vector<double>& g, double rate, double decay) {
-    ++t_;
-    const double c1 = 1.0 - std::pow(0.9, t_), c2 = 1.0 - std::pow(0.999, t_);
-    for (std::size_t i = 0; i < p.size(); ++i) {
-      mean_[i] += 0.1 * (g[i] - mean_[i]);
-      square_[i] += 0.001 * (g[i] * g[i] - square_[i]);
-      p[i] -= rate * (mean_[i] / c1 / (std::sqrt(square_[i] / c2) + 1e-8) + decay * p[i]);
-    }
-  }
-
- private:
-  std::vector<double> mean_, square_;
-  int t_ = 0;
 };
 
 class Barrier {
@@ -182,7 +169,7 @@ void trainNetwork(neural::NetworkFile& file, const DataSet& examples, const Data
   const std::vector<double> initial = parameters;
   std::vector<double> best = parameters;
   double best_error = std::numeric_limits<double>::infinity();
-  Adam adam(parameters.size());
+  neural::Adam adam(parameters.size(), {options.rate, 0.9, 0.999, 1e-8, options.weight_decay});
   simulation::Random random(options.seed, simulation::Stream::kTraining);
   std::vector<std::uint32_t> order(examples.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<std::uint32_t>(i);
@@ -230,8 +217,7 @@ void trainNetwork(neural::NetworkFile& file, const DataSet& examples, const Data
             gradient[i] /= static_cast<double>(batch);
           }
           const double share = static_cast<double>(done++) / total;
-          const double rate = options.rate * (0.01 + 0.99 * 0.5 * (1.0 + std::cos(M_PI * share)));
-          adam.step(parameters, gradient, rate, options.weight_decay);
+          adam.step(parameters, gradient, 0.01 + 0.99 * 0.5 * (1.0 + std::cos(M_PI * share)));
         }
         end.wait();
       }

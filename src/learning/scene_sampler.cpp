@@ -42,12 +42,11 @@ DataSet sampleScenes(const std::string& world_file, std::uint64_t seed, std::siz
   profile.build(line, truck, 0.25);
   Teacher teacher(setup.pilot.preview_driver, truck);
   simulation::Sensor articulation(sim.articulation, seed, Stream::kArticulation);
-  simulation::Sensor rate(sim.articulation_rate, seed, Stream::kArticulationRate);
   simulation::Sensor speed(sim.speed, seed, Stream::kSpeed);
   const geometry::Pose sensor{truck.lidar_x, truck.lidar_y, 0.0};
   const double last = line.length() - (line.closed() ? 0.0 : kEnd);
-  const double ahead = sim.lidar.latency + setup.pilot.preview_driver.transport_delay +
-                       setup.pilot.preview_driver.dead_time;
+  const double ahead = sim.lidar.latency + setup.pilot.preview_driver.truck.steering.transport_delay +
+                       setup.pilot.preview_driver.truck.steering.dead_time;
 
   DataSet examples;
   Stamp stamp{};
@@ -60,13 +59,18 @@ DataSet sampleScenes(const std::string& world_file, std::uint64_t seed, std::siz
     state.speed = random.uniform(spread.speed_min, spread.speed_max);
     const double profile_rate =
         (profile.at(state.station + 0.5) - profile.at(state.station - 0.5)) * state.speed;
-    state.articulation = profile.at(state.station) + spreadOut(random, spread.articulation);
+    const drivers::YawResponse response{random.uniform(spread.gain_min, spread.gain_max),
+                                        spreadOut(random, spread.disturbance)};
+    const double wanted = vehicle::steadyCurvature(truck, profile.at(state.station));
+    const double followed =
+        vehicle::steadyArticulation(truck, (wanted - response.disturbance) / response.gain);
+    state.articulation = followed + spreadOut(random, spread.articulation);
     state.articulation_rate = profile_rate + spreadOut(random, spread.rate);
     const geometry::PathPoint foot = line.at(state.station);
     const geometry::Pose pose =
         geometry::Pose{foot.x, foot.y, foot.heading}.compose({0.0, state.offset, state.heading_error});
     const double yaw_rate =
-        vehicle::yawRate(truck, state.speed, state.articulation, state.articulation_rate);
+        response.gain * vehicle::yawRate(truck, state.speed, state.articulation, state.articulation_rate);
     const double sweep = lidar.sweepDuration();
     const geometry::Pose later = pose.compose({state.speed * sweep, 0.0, yaw_rate * sweep});
     const geometry::Scan& scan = lidar.sweep(caster, pose.compose(sensor), later.compose(sensor),
@@ -75,12 +79,19 @@ DataSet sampleScenes(const std::string& world_file, std::uint64_t seed, std::siz
     if (!filtered.accepted) continue;
     Example example;
     example.ranges = filtered.network_scan.ranges;
-    example.articulation = static_cast<float>(articulation.measure(
-        state.articulation + state.articulation_rate * sim.lidar.latency, 0.02));
-    example.articulation_rate = static_cast<float>(rate.measure(state.articulation_rate, 0.02));
+    const double latency = sim.lidar.latency;
+    // Of the sensor's bias the driver has learned about half.
+    const double bias = 0.5 * articulation.bias();
+    example.articulation = static_cast<float>(
+        articulation.measure(state.articulation + state.articulation_rate * latency, 0.02) - bias);
+    const TruckBesideLine then = teacher.movedOn(line, state, response, ahead);
+    example.articulation_ahead = static_cast<float>(
+        then.articulation + articulation.bias() - bias + spread.ahead_error * random.normal());
     example.speed = static_cast<float>(speed.measure(state.speed, 0.02));
-    example.label =
-        static_cast<float>(teacher.command(line, teacher.movedOn(line, state, ahead)));
+    example.yaw_gain = static_cast<float>(response.gain);
+    example.yaw_disturbance = static_cast<float>(response.disturbance);
+    example.label = static_cast<float>(teacher.command(line, then, response));
+    if (!std::isfinite(example.label)) continue;
     example.tunnel = static_cast<std::uint32_t>(seed);
     examples.push_back(std::move(example));
   }

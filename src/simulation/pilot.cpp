@@ -35,7 +35,7 @@ Pilot::Pilot(const PilotParameters& parameters, const vehicle::TruckParameters& 
     preview_driver_.emplace(parameters.preview_driver, truck.geometry);
   }
   if (parameters.driver != DriverChoice::kPreviewDriver) {
-    lidar_driver_.emplace(parameters.lidar_driver, *parameters.network);
+    lidar_driver_.emplace(parameters.lidar_driver, truck.geometry, *parameters.network);
   }
 }
 

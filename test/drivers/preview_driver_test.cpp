@@ -65,7 +65,7 @@ TEST(PreviewDriver, ProposesNothingWithoutAValidTunnel) {
 }
 
 TEST(PreviewDriver, ProposesNothingOnAnOldTunnel) {
-  const double age = parameters().max_tunnel_age;
+  const double age = parameters().truck.max_tunnel_age;
   EXPECT_TRUE(driver().propose(tunnelAt(1.0), motionAt(1.0 + age), fromSeconds(1.0 + age)).valid);
   EXPECT_FALSE(driver().propose(tunnelAt(1.0), motionAt(1.0 + age), fromSeconds(1.001 + age)).valid);
 }
@@ -95,7 +95,7 @@ TEST(PreviewDriver, ItsCommandNeverMovesFasterThanTheSteering) {
     ASSERT_TRUE(proposal.valid);
     if (i > 0) {
       EXPECT_LE(std::abs(proposal.articulation_angle - last),
-                parameters().max_rate * 0.03 + parameters().dead_band + 1e-9);
+                parameters().truck.steering.max_rate * 0.03 + parameters().truck.steering.dead_band + 1e-9);
     }
     last = proposal.articulation_angle;
   }
@@ -108,7 +108,7 @@ TEST(PreviewDriver, StaysNearTheArticulationWhileSomeoneElseSteers) {
     const Proposal proposal =
         d.propose(tunnelAt(time, 1.0), motionAt(time + 0.03, 0.3), fromSeconds(time + 0.05));
     EXPECT_NEAR(proposal.articulation_angle, 0.3,
-                2.0 * parameters().lead + parameters().max_bias + parameters().dead_band);
+                2.0 * parameters().truck.steering.lead + parameters().truck.steering.max_bias + parameters().truck.steering.dead_band);
   }
 }
 

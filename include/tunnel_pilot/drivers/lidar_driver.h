@@ -7,6 +7,7 @@
 
 #include "tunnel_pilot/config/node.h"
 #include "tunnel_pilot/drivers/driver.h"
+#include "tunnel_pilot/drivers/steering_estimator.h"
 #include "tunnel_pilot/geometry/scan.h"
 #include "tunnel_pilot/neural/gaussian_code.h"
 #include "tunnel_pilot/neural/inference.h"
@@ -19,6 +20,16 @@ struct LidarDriverParameters {
   std::string network;  ///< file
   double speed;         ///< highest speed asked for [m/s]
   double max_scan_age;  ///< an older scan is not driven on [s]
+  SteeringEstimatorParameters steering;
+};
+
+/// What a network may be told of the truck beside the scan.
+struct TruckInputs {
+  double articulation = 0.0;        ///< measured, freed of the sensor's bias [rad]
+  double articulation_ahead = 0.0;  ///< when a command given now begins to act [rad]
+  double speed = 0.0;               ///< [m/s]
+  double yaw_gain = 1.0;            ///< g of YawObserver [1]
+  double yaw_disturbance = 0.0;     ///< d of YawObserver [1/m]
 };
 
 /// Reads and checks config/lidar_driver.yaml; a relative file name is looked for from `folder`. Throws
@@ -37,7 +48,7 @@ class LidarInputs {
   std::size_t size() const { return size_; }
   /// Fills `inputs` (size() values). False when a number is not finite or the scan has other than kBeams
   /// ranges or none that is usable.
-  bool fill(const std::vector<float>& ranges, const Motion& motion, float* inputs);
+  bool fill(const std::vector<float>& ranges, const TruckInputs& truck, float* inputs);
 
  private:
   bool bridgeGaps(const std::vector<float>& ranges);
@@ -51,13 +62,15 @@ class LidarInputs {
 class LidarDriver {
  public:
   /// Throws config::ConfigError when the network's inputs or outputs are not those of a lidar driver.
-  LidarDriver(const LidarDriverParameters& parameters, const neural::NetworkFile& network);
+  LidarDriver(const LidarDriverParameters& parameters, const vehicle::TruckGeometry& geometry,
+              const neural::NetworkFile& network);
 
   /// `scan` is the filter's network scan, `motion` the newest feedback; both at or before `now`.
   Proposal propose(const geometry::Scan& scan, const Motion& motion, Stamp now);
-  void reset() {}
+  void reset();
 
   const std::vector<float>& outputs() const { return outputs_; }  ///< of the last scan
+  const TruckInputs& truckInputs() const { return truck_; }       ///< at the last scan
   const std::string& model() const { return model_; }             ///< name and hash
 
  private:
@@ -65,6 +78,8 @@ class LidarDriver {
   LidarInputs inputs_;
   neural::Inference inference_;
   neural::GaussianCode code_;
+  SteeringEstimator steering_;
+  TruckInputs truck_;
   std::string model_;
   std::vector<float> values_;
   std::vector<float> outputs_;

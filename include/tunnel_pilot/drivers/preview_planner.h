@@ -5,35 +5,10 @@
 #include <array>
 #include <cstddef>
 
+#include "tunnel_pilot/drivers/path_model.h"
 #include "tunnel_pilot/geometry/path.h"
-#include "tunnel_pilot/vehicle/truck_parameters.h"
 
 namespace tunnel_pilot::drivers {
-
-/// State of the truck beside a path, as the steering's command will find it: command is the articulation
-/// demand that acts now (the dead time has passed).
-struct PathState {
-  double s = 0.0;              ///< foot point on the path [m]
-  double offset = 0.0;         ///< e_y, left of the path [m]
-  double heading_error = 0.0;  ///< e_psi, body heading minus path direction [rad]
-  double articulation = 0.0;   ///< gamma [rad]
-  double command = 0.0;        ///< u [rad]
-};
-
-/// What the driver knows of the truck's answer to steering.
-struct TruckResponse {
-  vehicle::TruckGeometry geometry;
-  double lag;               ///< of the articulation behind its command [s]
-  double max_rate;          ///< of articulation and command [rad/s]
-  double max_articulation;  ///< highest command [rad]
-  double slip_compliance;   ///< tyre slip angle per lateral acceleration, 1/(g C) [rad s^2/m]
-};
-
-/// How the yaw rate was measured to answer, beside what the kinematics say.
-struct YawResponse {
-  double gain = 1.0;         ///< g, on the part that steady articulation gives [1]
-  double disturbance = 0.0;  ///< d, sensor bias and slope of the road [1/m]
-};
 
 struct PreviewWeights {
   double offset;       ///< [1/m^2]
@@ -71,10 +46,6 @@ class PreviewPlanner {
               const YawResponse& believed, double elapsed);
   void reset();
 
-  /// One step of the model with the mean curvature of the path over the step.
-  PathState advance(const PathState& state, double command_rate, double speed, double curvature,
-                    const YawResponse& believed, double step) const;
-
   double cost() const { return cost_; }  ///< of the last plan
   /// The planned state `time` [s] after the last plan's start, interpolated; clamped to the horizon.
   PathState plannedAt(double time) const;
@@ -83,9 +54,9 @@ class PreviewPlanner {
   using Vector = Eigen::Vector4d;  ///< (offset, heading error, articulation, command)
   struct Linear;                   ///< derivatives of one step
 
-  /// The same for who has the cosine of the heading error already.
+  /// One step of the plan.
   PathState advance(const PathState& state, double cos_heading_error, double command_rate, double speed,
-                    double curvature, const YawResponse& believed, double step) const;
+                    double curvature, const YawResponse& believed) const;
   void shift(double elapsed);
   /// Follows the plan from `now`; with a `correction` above 0, first changes it by that share of the
   /// last sweep's corrections. Returns the cost.

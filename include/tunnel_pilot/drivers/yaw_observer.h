@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 
 #include "tunnel_pilot/drivers/driver.h"
-#include "tunnel_pilot/drivers/preview_planner.h"
+#include "tunnel_pilot/drivers/path_model.h"
 #include "tunnel_pilot/vehicle/truck_parameters.h"
 
 namespace tunnel_pilot::drivers {

@@ -17,7 +17,10 @@ struct SceneSpread {
   double heading = 0.25;        ///< [rad] largest
   double articulation = 0.2;    ///< [rad] largest
   double rate = 0.12;           ///< [rad/s] largest
-  double speed_min = 2.0, speed_max = 3.2;
+  double speed_min = 2.0, speed_max = 3.2;  ///< [m/s]
+  double gain_min = 0.7, gain_max = 1.25;   ///< yaw gain g [1]
+  double disturbance = 0.006;               ///< d, largest [1/m]
+  double ahead_error = 0.005;               ///< of the articulation foretold, standard deviation [rad]
 };
 
 /// Scans from places where no drive would come by itself, beside the demand that leads back: Pomerleau's

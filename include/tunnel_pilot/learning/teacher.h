@@ -25,13 +25,16 @@ class Teacher {
   Teacher(const drivers::PreviewDriverParameters& parameters, const vehicle::TruckGeometry& truck);
 
   /// Articulation to demand [rad].
-  double command(const geometry::Path& line, const TruckBesideLine& truck);
+  double command(const geometry::Path& line, const TruckBesideLine& truck,
+                 const drivers::YawResponse& believed);
 
   /// The truck moved on for `time` [s] along the line, its articulation going on at its rate.
-  TruckBesideLine movedOn(const geometry::Path& line, const TruckBesideLine& truck, double time) const;
+  TruckBesideLine movedOn(const geometry::Path& line, const TruckBesideLine& truck,
+                          const drivers::YawResponse& believed, double time) const;
 
  private:
   drivers::PreviewDriverParameters parameters_;
+  drivers::TruckResponse response_;
   drivers::PreviewPlanner planner_;
 };
 
