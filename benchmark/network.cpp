@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <utility>
@@ -71,9 +72,16 @@ double errorOf(NetworkPeer& peer, const Network& network, const std::vector<floa
   return largest;
 }
 
+// The one that is named, or that of the unpacked wheel in the build's folder; empty when there is none.
 std::string onnxLibrary() {
   const char* const named = std::getenv("ONNXRUNTIME_LIBRARY");
-  return named != nullptr ? named : ONNXRUNTIME_LIBRARY;
+  if (named != nullptr) return named;
+  std::error_code none;
+  for (const auto& entry : std::filesystem::directory_iterator(ONNXRUNTIME_FOLDER, none)) {
+    if (entry.path().filename().string().rfind("libonnxruntime.so", 0) == 0)
+      return entry.path().string();
+  }
+  return "";
 }
 
 std::vector<Entrant> entrants(const Network& network, const std::string& size, bool fixed) {
