@@ -22,6 +22,8 @@ class Inference {
   void run(const float* input, float* output);
 
  private:
+  friend struct InferenceAccess;  // a test that spoils parameters
+
   std::size_t inputs_, outputs_;
   std::vector<Layer> layers_;
   std::vector<float> parameters_;
