@@ -3,17 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "clones.h"
+
 namespace tunnel_pilot::neural {
 namespace {
 
 constexpr std::size_t kLanes = BatchPass::kLanes;
-
-#if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__clang__) && \
-    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define TUNNEL_PILOT_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
-#else
-#define TUNNEL_PILOT_CLONES
-#endif
 
 // y += sum over k of w[k] * row k of x. Four rows at a time, so that y stays in registers longer.
 TUNNEL_PILOT_CLONES void addWeighted(double* __restrict y, const double* __restrict w,
