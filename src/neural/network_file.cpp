@@ -214,8 +214,8 @@ std::optional<InputDomain> readDomain(Node& header, const std::string& mean,
     const std::vector<float> read = readNumbers(block, count, kDomainLimit, what, source);
     return std::vector<double>(read.begin(), read.end());
   };
-  domain.mean = take(mean, size, "domain mean");
-  domain.whitening = take(whitening, size * (size + 1) / 2, "domain whitening");
+  domain.mean = take(mean, size, "domain_mean number");
+  domain.whitening = take(whitening, size * (size + 1) / 2, "domain_whitening number");
   return domain;
 }
 

@@ -326,13 +326,13 @@ TEST_F(BadNetworkFile, AWrongDomainIsRefusedWithItsReason) {
       {"domain: {meaning: \"sectors\", size: 2, limit: 7.5}\n", "", "file: 'domain_mean' is unknown"},
       {"domain_mean: |\n  0.5 -1.25\n", "",
        "file: 'domain_mean' is missing, or is no block of numbers"},
-      {"size: 2", "size: 3", "file: domain mean: only 2 of 3"},
-      {"size: 2", "size: 1", "file: domain mean: more than the 1 that belong here"},
+      {"size: 2", "size: 3", "file: domain_mean numbers: only 2 of 3"},
+      {"size: 2", "size: 1", "file: domain_mean numbers: more than the 1 that belong here"},
       {"size: 2", "size: 257", "file: 'domain.size' = 257 must be a whole number [1] in [1, 256]"},
       {"limit: 7.5", "limit: 0", "file: 'domain.limit' = 0 must be a number [1] in [0.001, 1e+09]"},
       {"limit: 7.5", "limit: 7.5, factor: 2", "file: 'domain.factor' is unknown"},
-      {"  2 0.1 3\n", "  2 0.1\n", "file: domain whitening: only 2 of 3"},
-      {"  2 0.1 3\n", "  2 0.1 nan\n", "file: domain whitening 3 'nan' is not finite"},
+      {"  2 0.1 3\n", "  2 0.1\n", "file: domain_whitening numbers: only 2 of 3"},
+      {"  2 0.1 3\n", "  2 0.1 nan\n", "file: domain_whitening number 3 'nan' is not finite"},
   };
   const std::string good = textOf(networkWithDomain());
   for (const BadFile& bad : bad_domains) {
