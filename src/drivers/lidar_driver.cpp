@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "tunnel_pilot/drivers/inverse_ranges.h"
 #include "tunnel_pilot/drivers/motion_history.h"
 
 namespace tunnel_pilot::drivers {
@@ -44,6 +45,11 @@ neural::GaussianCode codeOf(const neural::NetworkFile& file) {
   return {file.network.outputs(), output.first, output.spacing, output.width};
 }
 
+std::optional<ScanDomain> domainOf(const neural::NetworkFile& file) {
+  if (!file.domain) return std::nullopt;
+  return ScanDomain(*file.domain, file.name);
+}
+
 }  // namespace
 
 LidarDriverParameters loadLidarDriver(config::Node node, const std::string& folder) {
@@ -70,7 +76,7 @@ LidarInputs::LidarInputs(const std::vector<InputGroup>& groups, const std::strin
 }
 
 bool LidarInputs::fill(const std::vector<float>& ranges, const TruckInputs& truck, float* inputs) {
-  if (ranges.size() != kBeams || !bridgeGaps(ranges)) return false;
+  if (ranges.size() != kBeams || !invertRanges(ranges, inverse_)) return false;
   for (const InputGroup& group : groups_) {
     if (group.meaning == "ranges") {
       const auto scale = static_cast<float>(group.scale);
@@ -91,33 +97,13 @@ bool LidarInputs::fill(const std::vector<float>& ranges, const TruckInputs& truc
   return true;
 }
 
-// Between two returns 1/r runs linearly, as along a wall; before the first and behind the last it stays.
-bool LidarInputs::bridgeGaps(const std::vector<float>& ranges) {
-  std::size_t last = kBeams;  // none yet
-  for (std::size_t i = 0; i < kBeams; ++i) {
-    if (!std::isfinite(ranges[i]) || ranges[i] <= 0.0F) continue;
-    inverse_[i] = 1.0F / ranges[i];
-    if (last == kBeams) {
-      std::fill_n(inverse_.begin(), i, inverse_[i]);
-    } else if (i - last > 1) {
-      const float step = (inverse_[i] - inverse_[last]) / static_cast<float>(i - last);
-      for (std::size_t k = last + 1; k < i; ++k) {
-        inverse_[k] = inverse_[last] + step * static_cast<float>(k - last);
-      }
-    }
-    last = i;
-  }
-  if (last == kBeams) return false;
-  std::fill(inverse_.begin() + static_cast<std::ptrdiff_t>(last) + 1, inverse_.end(), inverse_[last]);
-  return true;
-}
-
 LidarDriver::LidarDriver(const LidarDriverParameters& parameters,
                          const vehicle::TruckGeometry& geometry, const neural::NetworkFile& network)
     : parameters_(parameters),
       inputs_(network.inputs, network.name),
       inference_(network.network),
       code_(codeOf(network)),
+      domain_(domainOf(network)),
       steering_(parameters.steering, geometry),
       model_(network.name + " " + network.sha256),
       values_(inputs_.size()),
@@ -127,26 +113,68 @@ LidarDriver::LidarDriver(const LidarDriverParameters& parameters,
   }
 }
 
-void LidarDriver::reset() { steering_.reset(); }
+void LidarDriver::reset() {
+  steering_.reset();
+  inference_.reset();
+}
 
 Proposal LidarDriver::propose(const geometry::Scan& scan, const Motion& motion, Stamp now) {
   Proposal proposal;
   proposal.stamp = scan.stamp;
+  refusal_ = steer(scan, motion, now, proposal);
+  proposal.valid = refusal_ == Refusal::kNone;
+  return proposal;
+}
+
+LidarDriver::Refusal LidarDriver::steer(const geometry::Scan& scan, const Motion& motion, Stamp now,
+                                        Proposal& proposal) {
   const Stamp age = now - scan.stamp;
-  if (age < Stamp::zero() || toSeconds(age) > parameters_.max_scan_age) return proposal;
-  if (!isFinite(motion)) return proposal;
+  if (age < Stamp::zero() || toSeconds(age) > parameters_.max_scan_age) return Refusal::kScanAge;
+  if (!isFinite(motion)) return Refusal::kMotion;
   steering_.observe(motion);
   const double meets = steering_.articulationAhead(now);
   truck_ = {steering_.motion().articulation, meets, motion.speed, steering_.learned().gain,
             steering_.learned().disturbance};
-  if (!inputs_.fill(scan.ranges, truck_, values_.data())) return proposal;
-  inference_.run(values_.data(), outputs_.data());
+  if (!inputs_.fill(scan.ranges, truck_, values_.data())) return Refusal::kScan;
+  switch (inference_.run(values_.data(), outputs_.data(), now)) {
+    case WatchedInference::Health::kOutputRefused:
+      return Refusal::kOutputs;
+    case WatchedInference::Health::kGivenUp:
+      return Refusal::kGivenUp;
+    case WatchedInference::Health::kCorrupted:
+      return Refusal::kCorrupted;
+    case WatchedInference::Health::kGood:
+      break;
+  }
   const neural::GaussianCode::Decoded decoded = code_.decode(outputs_.data());
-  proposal.valid = decoded.peaks > 0;
+  if (decoded.peaks == 0) return Refusal::kNoBell;
   proposal.articulation_angle = steering_.give(decoded.value, meets, now);
   proposal.speed = parameters_.speed;
-  proposal.confidence = decoded.confidence;
-  return proposal;
+  proposal.confidence = decoded.confidence * (domain_ ? domain_->familiarity(inputs_.inverse()) : 1.0);
+  return Refusal::kNone;
+}
+
+std::string toString(LidarDriver::Refusal refusal) {
+  using Refusal = LidarDriver::Refusal;
+  switch (refusal) {
+    case Refusal::kNone:
+      return "none";
+    case Refusal::kScanAge:
+      return "no fresh scan";
+    case Refusal::kMotion:
+      return "motion feedback is not finite";
+    case Refusal::kScan:
+      return "the scan has no 761 beams or no return";
+    case Refusal::kOutputs:
+      return "the network's outputs are impossible";
+    case Refusal::kGivenUp:
+      return "the network's outputs were impossible again and again: it is no longer listened to";
+    case Refusal::kCorrupted:
+      return "the network failed its self check: its parameters in memory are corrupt";
+    case Refusal::kNoBell:
+      return "the network shows no direction";
+  }
+  return "unknown";
 }
 
 }  // namespace tunnel_pilot::drivers

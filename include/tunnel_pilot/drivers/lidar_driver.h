@@ -1,16 +1,18 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "tunnel_pilot/config/node.h"
 #include "tunnel_pilot/drivers/driver.h"
+#include "tunnel_pilot/drivers/scan_domain.h"
 #include "tunnel_pilot/drivers/steering_estimator.h"
+#include "tunnel_pilot/drivers/watched_inference.h"
 #include "tunnel_pilot/geometry/scan.h"
 #include "tunnel_pilot/neural/gaussian_code.h"
-#include "tunnel_pilot/neural/inference.h"
 #include "tunnel_pilot/neural/network_file.h"
 
 namespace tunnel_pilot::drivers {
@@ -50,39 +52,68 @@ class LidarInputs {
   /// ranges or none that is usable.
   bool fill(const std::vector<float>& ranges, const TruckInputs& truck, float* inputs);
 
- private:
-  bool bridgeGaps(const std::vector<float>& ranges);
+  /// 1/r of the last scan's beams, gaps bridged [1/m].
+  const std::vector<float>& inverse() const { return inverse_; }
 
+ private:
   std::vector<neural::InputGroup> groups_;
   std::size_t size_ = 0;
-  std::vector<float> inverse_;  ///< 1/r of each beam, gaps bridged [1/m]
+  std::vector<float> inverse_;
 };
 
-/// Steers by a network from the scan to the articulation (paper 000: 761-5-31 and its successors).
+/// Steers by a network from the scan to the articulation (paper 000: 761-5-31 and its successors). The
+/// confidence of its proposals is that of the decoded outputs, lowered for scans unlike those of the
+/// training where the network's file tells their domain (ScanDomain).
 class LidarDriver {
  public:
-  /// Throws config::ConfigError when the network's inputs or outputs are not those of a lidar driver.
+  /// Why the last proposal is not valid.
+  enum class Refusal : std::uint8_t {
+    kNone,
+    kScanAge,    ///< too old, or from the future
+    kMotion,     ///< not finite
+    kScan,       ///< no 761 beams, or none with a return
+    kOutputs,    ///< not finite or out of range
+    kGivenUp,    ///< that again and again
+    kCorrupted,  ///< the network's parameters in memory
+    kNoBell,     ///< no output is high enough to be decoded
+  };
+
+  /// Throws config::ConfigError when the network's inputs, outputs or domain are not those of a lidar
+  /// driver.
   LidarDriver(const LidarDriverParameters& parameters, const vehicle::TruckGeometry& geometry,
               const neural::NetworkFile& network);
 
   /// `scan` is the filter's network scan, `motion` the newest feedback; both at or before `now`.
   Proposal propose(const geometry::Scan& scan, const Motion& motion, Stamp now);
+  /// Forgets commands, what was learned of the truck, and refused outputs.
   void reset();
 
+  Refusal refusal() const { return refusal_; }
+
   const std::vector<float>& outputs() const { return outputs_; }  ///< of the last scan
+  const neural::GaussianCode& code() const { return code_; }      ///< what they stand for
   const TruckInputs& truckInputs() const { return truck_; }       ///< at the last scan
   const std::string& model() const { return model_; }             ///< name and hash
 
  private:
+  friend struct LidarDriverAccess;  // a test that spoils parameters
+
+  Refusal steer(const geometry::Scan& scan, const Motion& motion, Stamp now, Proposal& proposal);
+
   LidarDriverParameters parameters_;
   LidarInputs inputs_;
-  neural::Inference inference_;
+  WatchedInference inference_;
   neural::GaussianCode code_;
+  std::optional<ScanDomain> domain_;
   SteeringEstimator steering_;
   TruckInputs truck_;
+  Refusal refusal_ = Refusal::kScanAge;
   std::string model_;
   std::vector<float> values_;
   std::vector<float> outputs_;
 };
+
+/// In words an operator understands.
+std::string toString(LidarDriver::Refusal refusal);
 
 }  // namespace tunnel_pilot::drivers
