@@ -30,12 +30,6 @@ double TruckInputs::*memberOf(const std::string& meaning) {
   return nullptr;
 }
 
-double scaled(const InputGroup& group, double value) {
-  value = std::clamp(value, group.min, group.max);
-  return group.transform == InputGroup::Transform::kInverse ? group.scale / value
-                                                            : (value - group.offset) / group.scale;
-}
-
 neural::GaussianCode codeOf(const neural::NetworkFile& file) {
   const neural::OutputGroup& output = file.output;
   if (output.meaning != "articulation_angle" || output.unit != "rad" ||
@@ -57,6 +51,7 @@ LidarDriverParameters loadLidarDriver(config::Node node, const std::string& fold
   p.network = (std::filesystem::path(folder) / node.text("network")).lexically_normal().string();
   p.speed = node.number("speed", "m/s", 0.1, 15.0);
   p.max_scan_age = node.number("max_scan_age", "s", 0.05, 1.0);
+  p.mirror = node.boolean("mirror");
   p.steering = loadSteeringEstimator(node);
   node.finish();
   return p;
@@ -77,24 +72,37 @@ LidarInputs::LidarInputs(const std::vector<InputGroup>& groups, const std::strin
 
 bool LidarInputs::fill(const std::vector<float>& ranges, const TruckInputs& truck, float* inputs) {
   if (ranges.size() != kBeams || !invertRanges(ranges, inverse_)) return false;
+  for (const auto& [name, member] : kTruckInputs) {
+    if (!std::isfinite(truck.*member)) return false;
+  }
+  truck_ = truck;
+  write(inverse_.begin(), inverse_.end(), truck, inputs);
+  return true;
+}
+
+void LidarInputs::fillMirrored(float* inputs) const {
+  const TruckInputs mirrored{-truck_.articulation, -truck_.articulation_ahead, truck_.speed,
+                             truck_.yaw_gain, -truck_.yaw_disturbance};
+  write(inverse_.rbegin(), inverse_.rend(), mirrored, inputs);
+}
+
+template <typename Iterator>
+void LidarInputs::write(Iterator first, Iterator last, const TruckInputs& truck, float* inputs) const {
   for (const InputGroup& group : groups_) {
-    if (group.meaning == "ranges") {
-      const auto scale = static_cast<float>(group.scale);
-      const auto offset = static_cast<float>(group.offset);
-      const auto lowest = static_cast<float>(1.0 / group.max);
-      const auto highest = static_cast<float>(1.0 / std::max(group.min, 1e-3));
-      const bool inverse = group.transform == InputGroup::Transform::kInverse;
-      for (const float value : inverse_) {
-        const float x = std::clamp(value, lowest, highest);
-        *inputs++ = inverse ? scale * x : (1.0F / x - offset) / scale;
-      }
-    } else {
-      const double value = truck.*memberOf(group.meaning);
-      if (!std::isfinite(value)) return false;
-      *inputs++ = static_cast<float>(scaled(group, value));
+    if (group.meaning != "ranges") {
+      *inputs++ = static_cast<float>(group.scaled(truck.*memberOf(group.meaning)));
+      continue;
+    }
+    const auto scale = static_cast<float>(group.scale);
+    const auto offset = static_cast<float>(group.offset);
+    const auto lowest = static_cast<float>(1.0 / group.max);
+    const auto highest = static_cast<float>(1.0 / std::max(group.min, 1e-3));
+    const bool inverse = group.transform == InputGroup::Transform::kInverse;
+    for (Iterator beam = first; beam != last; ++beam) {
+      const float x = std::clamp(*beam, lowest, highest);
+      *inputs++ = inverse ? scale * x : (1.0F / x - offset) / scale;
     }
   }
-  return true;
 }
 
 LidarDriver::LidarDriver(const LidarDriverParameters& parameters,
@@ -107,7 +115,8 @@ LidarDriver::LidarDriver(const LidarDriverParameters& parameters,
       steering_(parameters.steering, geometry),
       model_(network.name + " " + network.sha256),
       values_(inputs_.size()),
-      outputs_(network.network.outputs()) {
+      outputs_(network.network.outputs()),
+      mirrored_(network.network.outputs()) {
   if (inputs_.size() != network.network.inputs()) {
     throw config::ConfigError(network.name + ": its inputs are not as many as its network takes");
   }
@@ -145,6 +154,15 @@ LidarDriver::Refusal LidarDriver::steer(const geometry::Scan& scan, const Motion
       return Refusal::kCorrupted;
     case WatchedInference::Health::kGood:
       break;
+  }
+  if (parameters_.mirror) {
+    inputs_.fillMirrored(values_.data());
+    if (inference_.run(values_.data(), mirrored_.data(), now) != WatchedInference::Health::kGood) {
+      return Refusal::kOutputs;
+    }
+    for (std::size_t i = 0; i < outputs_.size(); ++i) {
+      outputs_[i] = 0.5F * (outputs_[i] + mirrored_[mirrored_.size() - 1 - i]);
+    }
   }
   const neural::GaussianCode::Decoded decoded = code_.decode(outputs_.data());
   if (decoded.peaks == 0) return Refusal::kNoBell;

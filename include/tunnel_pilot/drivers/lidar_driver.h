@@ -22,6 +22,7 @@ struct LidarDriverParameters {
   std::string network;  ///< file
   double speed;         ///< highest speed asked for [m/s]
   double max_scan_age;  ///< an older scan is not driven on [s]
+  bool mirror;          ///< also asks the network about the scan's mirror image, and averages
   SteeringEstimatorParameters steering;
 };
 
@@ -52,13 +53,20 @@ class LidarInputs {
   /// ranges or none that is usable.
   bool fill(const std::vector<float>& ranges, const TruckInputs& truck, float* inputs);
 
+  /// The inputs of the last scan's mirror image, left for right.
+  void fillMirrored(float* inputs) const;
+
   /// 1/r of the last scan's beams, gaps bridged [1/m].
   const std::vector<float>& inverse() const { return inverse_; }
 
  private:
+  template <typename Iterator>
+  void write(Iterator first, Iterator last, const TruckInputs& truck, float* inputs) const;
+
   std::vector<neural::InputGroup> groups_;
   std::size_t size_ = 0;
   std::vector<float> inverse_;
+  TruckInputs truck_;
 };
 
 /// Steers by a network from the scan to the articulation (paper 000: 761-5-31 and its successors). The
@@ -111,6 +119,7 @@ class LidarDriver {
   std::string model_;
   std::vector<float> values_;
   std::vector<float> outputs_;
+  std::vector<float> mirrored_;
 };
 
 /// In words an operator understands.
