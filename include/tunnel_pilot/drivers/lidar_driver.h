@@ -23,6 +23,8 @@ struct LidarDriverParameters {
   double speed;         ///< highest speed asked for [m/s]
   double max_scan_age;  ///< an older scan is not driven on [s]
   bool mirror;          ///< also asks the network about the scan's mirror image, and averages
+  double sure;          ///< confidence below which a scan is bridged with the last sure answer [1]
+  double bridge_time;   ///< ... for so long [s]
   SteeringEstimatorParameters steering;
 };
 
@@ -69,8 +71,9 @@ class LidarInputs {
   TruckInputs truck_;
 };
 
-/// Steers by a network from the scan to the articulation (paper 000: 761-5-31 and its successors). The
-/// confidence of its proposals is that of the decoded outputs, lowered for scans unlike those of the
+/// Steers by a network from the scan to the articulation (paper 000: 761-5-31 and its successors). A scan
+/// that the network is not sure of (a cloud of dust before the lidar) is bridged for a moment with the
+/// last sure answer. The confidence of its proposals is that of the decoded outputs, lowered for scans unlike those of the
 /// training where the network's file tells their domain (ScanDomain).
 class LidarDriver {
  public:
@@ -99,19 +102,30 @@ class LidarDriver {
   Refusal refusal() const { return refusal_; }
 
   const std::vector<float>& outputs() const { return outputs_; }  ///< of the last scan
-  const neural::GaussianCode& code() const { return code_; }      ///< what they stand for
+  /// What the outputs stand for; none for a network with the articulation as its only output.
+  const std::optional<neural::GaussianCode>& code() const { return code_; }
   const TruckInputs& truckInputs() const { return truck_; }       ///< at the last scan
   const std::string& model() const { return model_; }             ///< name and hash
 
  private:
   friend struct LidarDriverAccess;  // a test that spoils parameters
 
+  /// What the network says of a scan.
+  struct Answer {
+    double articulation = 0.0;  ///< to demand [rad]
+    double confidence = 0.0;    ///< 0..1
+  };
+
   Refusal steer(const geometry::Scan& scan, const Motion& motion, Stamp now, Proposal& proposal);
+  Refusal ask(Stamp now);
+  std::optional<Answer> decode() const;
+  Answer bridged(const Answer& answer, Stamp stamp);
 
   LidarDriverParameters parameters_;
   LidarInputs inputs_;
   WatchedInference inference_;
-  neural::GaussianCode code_;
+  neural::OutputGroup output_;
+  std::optional<neural::GaussianCode> code_;  ///< none: one output, the articulation itself
   std::optional<ScanDomain> domain_;
   SteeringEstimator steering_;
   TruckInputs truck_;
@@ -120,6 +134,8 @@ class LidarDriver {
   std::vector<float> values_;
   std::vector<float> outputs_;
   std::vector<float> mirrored_;
+  Answer last_sure_;
+  std::optional<Stamp> last_sure_stamp_;  ///< of its scan
 };
 
 /// In words an operator understands.
