@@ -40,7 +40,8 @@ neural::GaussianCode codeOf(const neural::NetworkFile& file) {
   const neural::OutputGroup& output = file.output;
   if (output.meaning != "articulation_angle" || output.unit != "rad" ||
       output.code != neural::OutputGroup::Code::kGaussian) {
-    throw config::ConfigError(file.name + ": its outputs are no Gaussian code of the articulation angle");
+    throw config::ConfigError(file.name +
+                              ": its outputs are no Gaussian code of the articulation angle");
   }
   return {file.network.outputs(), output.first, output.spacing, output.width};
 }
@@ -97,8 +98,8 @@ bool LidarInputs::fill(const std::vector<float>& ranges, const TruckInputs& truc
   return true;
 }
 
-LidarDriver::LidarDriver(const LidarDriverParameters& parameters,
-                         const vehicle::TruckGeometry& geometry, const neural::NetworkFile& network)
+LidarDriver::LidarDriver(const LidarDriverParameters& parameters, const vehicle::TruckGeometry& geometry,
+                         const neural::NetworkFile& network)
     : parameters_(parameters),
       inputs_(network.inputs, network.name),
       inference_(network.network),
