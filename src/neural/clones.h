@@ -8,3 +8,6 @@
 #else
 #define TUNNEL_PILOT_CLONES
 #endif
+
+// What such a function calls must end up within it to be compiled likewise.
+#define TUNNEL_PILOT_INLINE __attribute__((always_inline)) inline

@@ -1,14 +1,12 @@
 #pragma once
 
 // Eight floats side by side, and what Inference needs of them. Every operation is one IEEE operation a
-// value, whatever instructions the machine has, so that results do not depend on it. All functions must
-// end up within their caller, which is compiled for several machines (clones.h): hence the attribute.
+// value, whatever instructions the machine has, so that results do not depend on it.
 
+#include "clones.h"
 #include "tunnel_pilot/neural/network.h"
 
 namespace tunnel_pilot::neural::vector_math {
-
-#define TUNNEL_PILOT_INLINE __attribute__((always_inline)) inline
 
 constexpr std::size_t kWidth = 8;
 using Floats = float __attribute__((vector_size(32)));
