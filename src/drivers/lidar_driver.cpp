@@ -109,8 +109,8 @@ void LidarInputs::write(Iterator first, Iterator last, const TruckInputs& truck,
   }
 }
 
-LidarDriver::LidarDriver(const LidarDriverParameters& parameters,
-                         const vehicle::TruckGeometry& geometry, const neural::NetworkFile& network)
+LidarDriver::LidarDriver(const LidarDriverParameters& parameters, const vehicle::TruckGeometry& geometry,
+                         const neural::NetworkFile& network)
     : parameters_(parameters),
       inputs_(network.inputs, network.name),
       inference_(network.network),

@@ -12,6 +12,8 @@ namespace tunnel_pilot::drivers {
 namespace {
 
 constexpr double kQuantile = 0.999;
+constexpr double kShare =
+    0.5;  // of the quantile: so the fall beyond the limit begins within what is rare
 // Added to each feature's variance: no scan is foreign for a few per cent that no training scan had.
 constexpr double kDeviation = 0.03;
 constexpr double kLeastInverse = 1e-6;  // [1/m]
@@ -47,7 +49,7 @@ ScanDomain::Features ScanDomain::features(const std::vector<float>& inverse) {
   return features;
 }
 
-neural::InputDomain ScanDomain::fit(const std::vector<Features>& examples, double factor) {
+neural::InputDomain ScanDomain::fit(const std::vector<Features>& examples) {
   if (examples.size() < 10 * kSectors) throw std::invalid_argument("too few scans for a domain");
   const double count = static_cast<double>(examples.size());
   Vector mean = Vector::Zero();
@@ -71,7 +73,7 @@ neural::InputDomain ScanDomain::fit(const std::vector<Features>& examples, doubl
   for (const Features& example : examples) distances.push_back(fitted.distance(example));
   const auto last = static_cast<std::ptrdiff_t>(kQuantile * (count - 1.0));
   std::nth_element(distances.begin(), distances.begin() + last, distances.end());
-  domain.limit = factor * distances[static_cast<std::size_t>(last)];
+  domain.limit = kShare * distances[static_cast<std::size_t>(last)];
   return domain;
 }
 
@@ -90,7 +92,8 @@ double ScanDomain::distance(const Features& features) const {
 
 double ScanDomain::familiarity(const std::vector<float>& inverse) const {
   const double d2 = distance(features(inverse));
-  return d2 <= limit_ ? 1.0 : limit_ / d2;
+  const double beyond = std::max(1.0, d2 / limit_);
+  return 1.0 / (beyond * beyond);
 }
 
 }  // namespace tunnel_pilot::drivers

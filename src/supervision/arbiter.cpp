@@ -167,9 +167,9 @@ const drivers::Proposal* Arbiter::healthyProposal(Source source, Stamp now) cons
 void Arbiter::compareDrivers(Stamp now) {
   const drivers::Proposal* lidar = healthyProposal(Source::kLidarDriver, now);
   const drivers::Proposal* preview = healthyProposal(Source::kPreviewDriver, now);
-  const bool disagree = lidar && preview &&
-                        std::abs(lidar->articulation_angle - preview->articulation_angle) >
-                            parameters_.disagreement_angle;
+  const bool disagree =
+      lidar && preview &&
+      std::abs(lidar->articulation_angle - preview->articulation_angle) > parameters_.disagreement_angle;
   if (!disagree) {
     disagree_since_.reset();
   } else if (!disagree_since_) {

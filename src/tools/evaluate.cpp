@@ -121,6 +121,22 @@ std::string endings(const std::vector<simulation::EpisodeResult>& episodes) {
   return text;
 }
 
+// Which network drove, and how long.
+std::string networkLine(const neural::NetworkFile& network,
+                        const std::vector<simulation::EpisodeResult>& episodes) {
+  double share = 0.0;
+  int drives = 0;
+  for (const simulation::EpisodeResult& episode : episodes) {
+    const auto found = episode.metrics.find("lidar_driver_share");
+    if (found == episode.metrics.end()) continue;
+    share += found->second;
+    ++drives;
+  }
+  char text[64];
+  std::snprintf(text, sizeof text, " steered %.1f %% of the time.", 100.0 * share / std::max(drives, 1));
+  return "Network " + network.name + " " + network.sha256.substr(0, 12) + text;
+}
+
 // True when every goal of the scenario holds.
 bool evaluate(const std::string& file, const Arguments& arguments) {
   simulation::Scenario scenario = simulation::loadScenario(file);
@@ -144,6 +160,7 @@ bool evaluate(const std::string& file, const Arguments& arguments) {
   std::printf("%zu episodes, %.0f times real time: %s. %s\n\n", episodes.size(),
               simulatedTime(episodes) / std::max(elapsed, 1e-9), endings(episodes).c_str(),
               evaluation.passed ? "Every goal holds." : "A goal is MISSED.");
+  if (setup.pilot.network) std::printf("%s\n\n", networkLine(*setup.pilot.network, episodes).c_str());
   std::fflush(stdout);
   if (!folder.empty()) {
     simulation::writeReport(folder, scenario, evaluation, episodes, setup.fingerprints,

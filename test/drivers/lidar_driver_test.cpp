@@ -242,7 +242,8 @@ struct Lidar {
 class OtherLidar : public testing::TestWithParam<Lidar> {};
 
 std::optional<Proposal> throughFilter(const geometry::Scan& scan) {
-  perception::ScanFilter filter(perception::loadScanFilter(config::loadFile(kConfig + "scan_filter.yaml")));
+  perception::ScanFilter filter(
+      perception::loadScanFilter(config::loadFile(kConfig + "scan_filter.yaml")));
   const auto& result = filter.filter(scan, {}, scan.stamp + std::chrono::milliseconds(10));
   if (!result.accepted) return std::nullopt;
   LidarDriver driver = driverOf(randomNetwork());
@@ -259,8 +260,7 @@ TEST_P(OtherLidar, GivesNearlyTheSameProposal) {
   ASSERT_TRUE(native->valid && other->valid && elsewhere->valid);
   const double difference = std::abs(other->articulation_angle - native->articulation_angle);
   EXPECT_LT(difference, 0.002);
-  EXPECT_LT(difference,
-            0.1 * std::abs(elsewhere->articulation_angle - native->articulation_angle))
+  EXPECT_LT(difference, 0.1 * std::abs(elsewhere->articulation_angle - native->articulation_angle))
       << "0.8 m further right";
 }
 

@@ -28,8 +28,14 @@ inline neural::NetworkFile randomNetwork(std::uint64_t seed = 1) {
   std::vector<InputGroup> inputs = {
       {"ranges", "m", 761, InputGroup::Transform::kInverse, 0.0, 2.0, 0.5, 40.0},
       {"articulation", "rad", 1, InputGroup::Transform::kLinear, 0.0, 0.75, -0.8, 0.8}};
-  neural::OutputGroup output{"articulation_angle", "rad", neural::OutputGroup::Code::kGaussian,
-                             0.0, 1.0, kFirst, kSpacing, kWidth};
+  neural::OutputGroup output{"articulation_angle",
+                             "rad",
+                             neural::OutputGroup::Code::kGaussian,
+                             0.0,
+                             1.0,
+                             kFirst,
+                             kSpacing,
+                             kWidth};
   return {"random", network, inputs, output, "none: random weights of a test", ""};
 }
 

@@ -150,7 +150,8 @@ TEST(Arbiter, AProposalFromTheFutureIsNotFollowed) {
 
 // ---- a driver that is unsure, drivers that disagree (RELIABILITY N3)
 
-drivers::Proposal lidarProposal(const ArbiterBench& bench, double confidence, double articulation = 0.01) {
+drivers::Proposal lidarProposal(const ArbiterBench& bench, double confidence,
+                                double articulation = 0.01) {
   drivers::Proposal proposal = bench.proposal(articulation);
   proposal.confidence = confidence;
   return proposal;

@@ -41,8 +41,8 @@ struct TruckInputs {
 /// config::ConfigError.
 LidarDriverParameters loadLidarDriver(config::Node node, const std::string& folder);
 
-/// The inputs of a network that steers by a scan, scaled as its file says. Gaps in the ranges are bridged
-/// in 1/r, in which walls are straight lines.
+/// The inputs of a network that steers by a scan, scaled as its file says. Gaps in the ranges are
+/// bridged in 1/r, in which walls are straight lines.
 class LidarInputs {
  public:
   static constexpr std::size_t kBeams = 761;

@@ -38,6 +38,8 @@ class Inference {
   };
 
  private:
+  friend struct InferenceAccess;  // a test that spoils parameters
+
   // Vectors that begin at the begin of a cache line are loaded at once.
   template <typename T>
   struct Aligned {
