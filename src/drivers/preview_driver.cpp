@@ -42,8 +42,7 @@ Proposal PreviewDriver::propose(const perception::Tunnel& tunnel, const Motion& 
 
   const double elapsed = predictor_.elapsed(now);
   const double speed = std::max(motion.speed, parameters_.planning_speed);
-  const double rate =
-      planner_.plan(*start, tunnel.centerline, speed, predictor_.learned(), elapsed);
+  const double rate = planner_.plan(*start, tunnel.centerline, speed, predictor_.learned(), elapsed);
 
   proposal.valid = true;
   proposal.articulation_angle = predictor_.give(start->command + rate * elapsed, *start, now);

@@ -20,11 +20,11 @@ struct Motion {
 
 /// What a driver asks for. Steering and speed are chosen apart by the arbiter.
 struct Proposal {
-  Stamp stamp{};                     ///< of the measurement (scan) it stems from
+  Stamp stamp{};  ///< of the measurement (scan) it stems from
   bool valid = false;
-  double articulation_angle = 0.0;   ///< [rad]
-  double speed = 0.0;                ///< highest speed the driver thinks right [m/s]
-  double confidence = 0.0;           ///< 0..1
+  double articulation_angle = 0.0;               ///< [rad]
+  double speed = 0.0;                            ///< highest speed the driver thinks right [m/s]
+  double confidence = 0.0;                       ///< 0..1
   std::optional<geometry::Point> preview_point;  ///< in base_link, for the eyes [m]
 };
 
