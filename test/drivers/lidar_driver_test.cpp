@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <random>
 
 #include "random_network.h"
+#include "tunnel_pilot/drivers/inverse_ranges.h"
 #include "tunnel_pilot/perception/scan_filter.h"
 
 namespace tunnel_pilot::neural {
@@ -129,6 +131,44 @@ TEST(LidarDriver, ANetworkForOtherInputsOrOutputsIsRefused) {
   EXPECT_THROW(driverOf(network), config::ConfigError);
   network = randomNetwork();
   network.output.meaning = "speed";
+  EXPECT_THROW(driverOf(network), config::ConfigError);
+}
+
+// ---- scans unlike those of the training (RELIABILITY N3)
+
+// A domain in which a scan of `centre` lies in the middle and every feature may vary by about a tenth.
+neural::InputDomain domainAround(const geometry::Scan& centre) {
+  std::vector<float> inverse;
+  EXPECT_TRUE(invertRanges(centre.ranges, inverse));
+  const ScanDomain::Features middle = ScanDomain::features(inverse);
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal(0.0, 0.1);
+  std::vector<ScanDomain::Features> examples(2000, middle);
+  for (ScanDomain::Features& example : examples) {
+    for (double& feature : example) feature += normal(random);
+  }
+  return ScanDomain::fit(examples);
+}
+
+TEST(LidarDriver, IsAsSureOfAFamiliarScanAsWithoutADomainAndLessOfAForeignOne) {
+  neural::NetworkFile network = randomNetwork();
+  LidarDriver without = driverOf(network);
+  network.domain = domainAround(nativeScan(1.0));
+  LidarDriver with = driverOf(network);
+  EXPECT_EQ(proposeAt(with, 1.0).confidence, proposeAt(without, 1.0).confidence);
+  geometry::Scan foreign = nativeScan(1.1);
+  for (float& range : foreign.ranges) range *= 3.0F;
+  const Motion motion = motionAt(1.13);
+  const double sure = without.propose(foreign, motion, fromSeconds(1.14)).confidence;
+  const Proposal proposal = with.propose(foreign, motion, fromSeconds(1.14));
+  EXPECT_TRUE(proposal.valid);
+  EXPECT_LT(proposal.confidence, 0.25 * sure);
+}
+
+TEST(LidarDriver, ANetworkWithADomainOfOtherFeaturesIsRefused) {
+  neural::NetworkFile network = randomNetwork();
+  network.domain = domainAround(nativeScan(1.0));
+  network.domain->meaning = "other";
   EXPECT_THROW(driverOf(network), config::ConfigError);
 }
 
