@@ -69,8 +69,10 @@ void LidarDriverRos::onScan(const sensor_msgs::LaserScan& message) {
   if (refused) ROS_WARN_THROTTLE(1.0, "lidar_driver: %s", problem_.c_str());
   auto answer = boost::make_shared<Proposal>(toRos(proposal));
   answer->outputs = driver_.outputs();
-  answer->outputs_first = driver_.code().node(0);
-  answer->outputs_spacing = driver_.code().node(1) - driver_.code().node(0);
+  if (const auto& code = driver_.code()) {
+    answer->outputs_first = code->node(0);
+    answer->outputs_spacing = code->node(1) - code->node(0);
+  }
   answer->model = driver_.model();
   publisher_.publish(answer);
 }

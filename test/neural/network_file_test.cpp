@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include <chrono>
 #include <clocale>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -156,11 +156,11 @@ TEST(NetworkFile, SixtyThousandParametersLoadInLessThanHalfASecond) {
   network.network = large;
   network.inputs = {{"ranges", "m", 1900, InputGroup::Transform::kLinear, 0.0, 40.0, 0.0, 40.0}};
   saveNetwork(folder.file("a.yaml"), network);
-  const auto start = std::chrono::steady_clock::now();
+  const std::clock_t start = std::clock();  // processor time: other programs do not count
   loadNetwork(folder.file("a.yaml"));
-  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
-  RecordProperty("load_ms", static_cast<int>(1e3 * taken.count()));
-  EXPECT_LT(taken.count(), 0.5);
+  const double taken = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+  RecordProperty("load_ms", static_cast<int>(1e3 * taken));
+  EXPECT_LT(taken, 0.5);
 }
 
 TEST(InputGroup, ScalesAfterItClamps) {

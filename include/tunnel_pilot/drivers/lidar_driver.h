@@ -22,6 +22,9 @@ struct LidarDriverParameters {
   std::string network;  ///< file
   double speed;         ///< highest speed asked for [m/s]
   double max_scan_age;  ///< an older scan is not driven on [s]
+  bool mirror;          ///< also asks the network about the scan's mirror image, and averages
+  double sure;          ///< confidence below which a scan is bridged with the last sure answer [1]
+  double bridge_time;   ///< ... for so long [s]
   SteeringEstimatorParameters steering;
 };
 
@@ -52,17 +55,25 @@ class LidarInputs {
   /// ranges or none that is usable.
   bool fill(const std::vector<float>& ranges, const TruckInputs& truck, float* inputs);
 
+  /// The inputs of the last scan's mirror image, left for right.
+  void fillMirrored(float* inputs) const;
+
   /// 1/r of the last scan's beams, gaps bridged [1/m].
   const std::vector<float>& inverse() const { return inverse_; }
 
  private:
+  template <typename Iterator>
+  void write(Iterator first, Iterator last, const TruckInputs& truck, float* inputs) const;
+
   std::vector<neural::InputGroup> groups_;
   std::size_t size_ = 0;
   std::vector<float> inverse_;
+  TruckInputs truck_;
 };
 
-/// Steers by a network from the scan to the articulation (paper 000: 761-5-31 and its successors). The
-/// confidence of its proposals is that of the decoded outputs, lowered for scans unlike those of the
+/// Steers by a network from the scan to the articulation (paper 000: 761-5-31 and its successors). A scan
+/// that the network is not sure of (a cloud of dust before the lidar) is bridged for a moment with the
+/// last sure answer. The confidence of its proposals is that of the decoded outputs, lowered for scans unlike those of the
 /// training where the network's file tells their domain (ScanDomain).
 class LidarDriver {
  public:
@@ -91,19 +102,30 @@ class LidarDriver {
   Refusal refusal() const { return refusal_; }
 
   const std::vector<float>& outputs() const { return outputs_; }  ///< of the last scan
-  const neural::GaussianCode& code() const { return code_; }      ///< what they stand for
+  /// What the outputs stand for; none for a network with the articulation as its only output.
+  const std::optional<neural::GaussianCode>& code() const { return code_; }
   const TruckInputs& truckInputs() const { return truck_; }       ///< at the last scan
   const std::string& model() const { return model_; }             ///< name and hash
 
  private:
   friend struct LidarDriverAccess;  // a test that spoils parameters
 
+  /// What the network says of a scan.
+  struct Answer {
+    double articulation = 0.0;  ///< to demand [rad]
+    double confidence = 0.0;    ///< 0..1
+  };
+
   Refusal steer(const geometry::Scan& scan, const Motion& motion, Stamp now, Proposal& proposal);
+  Refusal ask(Stamp now);
+  std::optional<Answer> decode() const;
+  Answer bridged(const Answer& answer, Stamp stamp);
 
   LidarDriverParameters parameters_;
   LidarInputs inputs_;
   WatchedInference inference_;
-  neural::GaussianCode code_;
+  neural::OutputGroup output_;
+  std::optional<neural::GaussianCode> code_;  ///< none: one output, the articulation itself
   std::optional<ScanDomain> domain_;
   SteeringEstimator steering_;
   TruckInputs truck_;
@@ -111,6 +133,9 @@ class LidarDriver {
   std::string model_;
   std::vector<float> values_;
   std::vector<float> outputs_;
+  std::vector<float> mirrored_;
+  Answer last_sure_;
+  std::optional<Stamp> last_sure_stamp_;  ///< of its scan
 };
 
 /// In words an operator understands.
