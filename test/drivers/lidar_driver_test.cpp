@@ -150,19 +150,33 @@ neural::InputDomain domainAround(const geometry::Scan& centre) {
   return ScanDomain::fit(examples);
 }
 
+Proposal proposeForeignAt(LidarDriver& driver, double time) {
+  geometry::Scan foreign = nativeScan(time);
+  for (float& range : foreign.ranges) range *= 3.0F;
+  return driver.propose(foreign, motionAt(time + 0.03), fromSeconds(time + 0.04));
+}
+
 TEST(LidarDriver, IsAsSureOfAFamiliarScanAsWithoutADomainAndLessOfAForeignOne) {
   neural::NetworkFile network = randomNetwork();
   LidarDriver without = driverOf(network);
   network.domain = domainAround(nativeScan(1.0));
   LidarDriver with = driverOf(network);
   EXPECT_EQ(proposeAt(with, 1.0).confidence, proposeAt(without, 1.0).confidence);
-  geometry::Scan foreign = nativeScan(1.1);
-  for (float& range : foreign.ranges) range *= 3.0F;
-  const Motion motion = motionAt(1.13);
-  const double sure = without.propose(foreign, motion, fromSeconds(1.14)).confidence;
-  const Proposal proposal = with.propose(foreign, motion, fromSeconds(1.14));
+  const double later = 1.1 + parameters().bridge_time;
+  const Proposal proposal = proposeForeignAt(with, later);
   EXPECT_TRUE(proposal.valid);
-  EXPECT_LT(proposal.confidence, 0.25 * sure);
+  EXPECT_LT(proposal.confidence, 0.25 * proposeForeignAt(without, later).confidence);
+}
+
+TEST(LidarDriver, AForeignScanIsBridgedForAMomentWithTheLastSureAnswer) {
+  neural::NetworkFile network = randomNetwork();
+  network.domain = domainAround(nativeScan(1.0));
+  LidarDriver driver = driverOf(network);
+  const Proposal sure = proposeAt(driver, 1.0);
+  ASSERT_GT(sure.confidence, parameters().sure);
+  const double last = 0.99 * parameters().bridge_time;
+  EXPECT_EQ(proposeForeignAt(driver, 1.0 + last).confidence, sure.confidence);
+  EXPECT_LT(proposeForeignAt(driver, 1.01 + parameters().bridge_time).confidence, sure.confidence);
 }
 
 TEST(LidarDriver, ANetworkWithADomainOfOtherFeaturesIsRefused) {
