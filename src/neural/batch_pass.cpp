@@ -8,8 +8,8 @@ namespace {
 
 constexpr std::size_t kLanes = BatchPass::kLanes;
 
-#if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)
+#if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__clang__) && \
+    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define TUNNEL_PILOT_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
 #else
 #define TUNNEL_PILOT_CLONES
@@ -94,8 +94,8 @@ void forwardLayer(const Layer& layer, const double* parameters, const double* x,
       double* out = y + (c * positions + p) * kLanes;
       std::fill_n(out, kLanes, bias[c]);
       for (std::size_t i = 0; i < layer.channels_in; ++i) {
-        addWeighted(out, weights + i * layer.kernel, x + (i * layer.length_in + p * layer.stride) * kLanes,
-                    layer.kernel);
+        addWeighted(out, weights + i * layer.kernel,
+                    x + (i * layer.length_in + p * layer.stride) * kLanes, layer.kernel);
       }
     }
   }

@@ -99,7 +99,8 @@ void Network::randomise(std::uint64_t seed) {
     const double fan_out = static_cast<double>(
         layer.kind == Layer::Kind::kDense ? layer.channels_out : layer.channels_out * layer.kernel);
     const double reach = std::sqrt(6.0 / (fan_in + fan_out));
-    for (std::size_t i = 0; i < layer.weights(); ++i) *parameter++ = reach * (2.0 * uniform(state) - 1.0);
+    for (std::size_t i = 0; i < layer.weights(); ++i)
+      *parameter++ = reach * (2.0 * uniform(state) - 1.0);
     for (std::size_t i = 0; i < layer.channels_out; ++i) *parameter++ = 0.0;
   }
 }

@@ -11,8 +11,8 @@ namespace tunnel_pilot::neural {
 /// every sample. All sums run in an order that the source fixes, so that results are the same with every
 /// vector width. Double precision: for training, and as the reference for Inference.
 ///
-/// Use: fill input(), forward(), read output(), fill outputGradient() with dE/dy (zero in lanes that hold
-/// no sample), backward(), which adds dE/dp of all lanes. Allocates nothing after construction. The
+/// Use: fill input(), forward(), read output(), fill outputGradient() with dE/dy (zero in lanes that
+/// hold no sample), backward(), which adds dE/dp of all lanes. Allocates nothing after construction. The
 /// network must outlive it and keep its layers; its parameters may change between passes.
 class BatchPass {
  public:
