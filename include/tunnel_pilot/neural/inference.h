@@ -23,6 +23,9 @@ class Inference {
 
  private:
   std::size_t inputs_, outputs_;
+  std::vector<Layer> layers_;
+  std::vector<float> parameters_;
+  std::vector<float> front_, back_;
 };
 
 }  // namespace tunnel_pilot::neural

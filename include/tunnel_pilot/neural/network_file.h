@@ -22,6 +22,9 @@ struct InputGroup {
   double scale = 1.0;
   double min = 0.0;
   double max = 0.0;
+
+  /// The network's input for a value, which must be finite.
+  double scaled(double value) const;
 };
 
 /// What the outputs mean. Values: y = (value - offset) / scale, one output each. Gaussian: the outputs
@@ -48,14 +51,19 @@ struct NetworkFile {
   std::string sha256;    ///< of the file's content but for this line; set by load and save
 };
 
-/// Reads and checks a network file: format, version, sizes against each other, finite parameters of
-/// magnitude below 1000, SHA-256, and that the network gives the file's golden output for its golden
-/// input. Throws config::ConfigError with the reason; nothing is allocated for sizes that are refused.
+/// Reads and checks a network file (docs/neural.md): at most 64 MiB, format, version, SHA-256, no
+/// unknown or missing key, sizes against each other, finite parameters of magnitude below 1000, and that
+/// Inference gives the file's golden output for its golden input, within 1e-5. Throws
+/// config::ConfigError with the reason; nothing is allocated for sizes that are refused.
 NetworkFile loadNetwork(const std::string& file);
 
-/// Writes `network` (parameters rounded to float first) with a new golden pair and hash, to a temporary
-/// file that then takes the place of `file`, so that a half-written one is never seen. Sets sha256.
-/// Throws config::ConfigError.
+/// The same from a file's content; `source` names it in messages.
+NetworkFile parseNetwork(const std::string& content, const std::string& source);
+
+/// Writes `network` with a new golden pair and hash, to a temporary file in the same folder that is read
+/// back and then takes the place of `file`, so that neither a half-written nor an unreadable one is ever
+/// seen there. Changes in `network`: parameters are rounded to float, spaces at the end of `training`
+/// are dropped, sha256 is set. Throws config::ConfigError; what stood at `file` then stands there still.
 void saveNetwork(const std::string& file, NetworkFile& network);
 
 }  // namespace tunnel_pilot::neural

@@ -5,9 +5,6 @@
 
 namespace tunnel_pilot::simulation {
 
-/// SHA-256 (FIPS 180-4) of a text, in hexadecimal.
-std::string sha256(const std::string& text);
-
 /// SHA-256 over the contents of these files, one after the other (what `cat files | sha256sum` tells).
 /// Throws config::ConfigError when one cannot be read.
 std::string sha256OfFiles(const std::vector<std::string>& files);
