@@ -200,8 +200,8 @@ void PathPredictor::dropCommands(double articulation) {
 
 double PathPredictor::give(double command, const PathState& start, Stamp now) {
   // What leads the articulation by more than the lag explains would only have to be taken back.
-  command = std::clamp(command, start.articulation - parameters_.lead,
-                       start.articulation + parameters_.lead);
+  command =
+      std::clamp(command, start.articulation - parameters_.lead, start.articulation + parameters_.lead);
   command = std::clamp(command, -parameters_.max_articulation, parameters_.max_articulation);
   const double half_band = 0.5 * parameters_.dead_band;
   play_ = std::clamp(play_ + kDeadBandGain * (command - given_[newest_].command), -half_band, half_band);

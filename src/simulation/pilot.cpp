@@ -1,5 +1,7 @@
 #include "tunnel_pilot/simulation/pilot.h"
 
+#include "tunnel_pilot/drivers/preview_laws.h"
+
 namespace tunnel_pilot::simulation {
 namespace {
 
@@ -18,7 +20,7 @@ std::vector<std::string> pilotFiles(const std::string& config_folder) {
 PilotParameters loadPilot(const std::string& config_folder) {
   const std::string folder = config_folder + "/";
   return {loadPerception(perceptionFiles(config_folder)),
-          drivers::loadPreviewDriver(config::loadFile(folder + "preview_driver.yaml")),
+          drivers::loadPreviewDriver(config::loadFile(folder + "preview_driver.yaml"), config_folder),
           supervision::loadArbiter(config::loadFile(folder + "arbiter.yaml")),
           bridge::loadBridge(config::loadFile(folder + "can_bridge.yaml"))};
 }
@@ -26,7 +28,7 @@ PilotParameters loadPilot(const std::string& config_folder) {
 Pilot::Pilot(const PilotParameters& parameters, const vehicle::TruckParameters& truck, can::Bus& bus)
     : sensor_in_base_{truck.geometry.lidar_x, truck.geometry.lidar_y, 0.0},
       perception_(parameters.perception),
-      driver_(parameters.preview_driver, truck.geometry),
+      driver_(drivers::makePreviewDriver(parameters.preview_driver, truck.geometry)),
       arbiter_(parameters.arbiter, truck),
       bridge_(parameters.bridge, truck.geometry, bus) {}
 
@@ -50,7 +52,7 @@ void Pilot::takeTunnel(const perception::Tunnel& tunnel, Stamp now) {
 
 void Pilot::drive(Stamp now) {
   arbiter_.setTunnel(tunnel_, now);
-  proposal_ = driver_.propose(tunnel_, bridge_.motion(), now);
+  proposal_ = driver_->propose(tunnel_, bridge_.motion(), now);
   arbiter_.setProposal(supervision::Source::kPreviewDriver, proposal_, now);
   decide(now);
 }

@@ -12,7 +12,7 @@ const std::string kConfig = std::string(TUNNEL_PILOT_SOURCE_DIR) + "/config/";
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 PreviewDriverParameters parameters() {
-  return loadPreviewDriver(config::loadFile(kConfig + "preview_driver.yaml"));
+  return loadPreviewDriver(config::loadFile(kConfig + "preview_driver.yaml"), kConfig);
 }
 
 PreviewDriver driver() { return {parameters(), vehicle::loadTruck(kConfig + "truck.yaml").geometry}; }
@@ -107,8 +107,9 @@ TEST(PreviewDriver, StaysNearTheArticulationWhileSomeoneElseSteers) {
     const double time = 1.0 + 0.03 * i;
     const Proposal proposal =
         d.propose(tunnelAt(time, 1.0), motionAt(time + 0.03, 0.3), fromSeconds(time + 0.05));
-    EXPECT_NEAR(proposal.articulation_angle, 0.3,
-                2.0 * parameters().truck.lead + parameters().truck.max_bias + parameters().truck.dead_band);
+    EXPECT_NEAR(
+        proposal.articulation_angle, 0.3,
+        2.0 * parameters().truck.lead + parameters().truck.max_bias + parameters().truck.dead_band);
   }
 }
 
@@ -161,7 +162,7 @@ TEST(PreviewDriverParameters, OutOfRangeIsRefusedByName) {
   YAML::Node yaml = YAML::LoadFile(kConfig + "preview_driver.yaml");
   yaml["steering"]["dead_time"] = -0.1;
   try {
-    loadPreviewDriver(config::Node(yaml, "preview_driver.yaml"));
+    loadPreviewDriver(config::Node(yaml, "preview_driver.yaml"), kConfig);
     FAIL() << "not refused";
   } catch (const config::ConfigError& e) {
     EXPECT_NE(std::string(e.what()).find("steering.dead_time"), std::string::npos) << e.what();
@@ -171,7 +172,8 @@ TEST(PreviewDriverParameters, OutOfRangeIsRefusedByName) {
 TEST(PreviewDriverParameters, UnknownKeyIsRefused) {
   YAML::Node yaml = YAML::LoadFile(kConfig + "preview_driver.yaml");
   yaml["sped"] = 3.0;
-  EXPECT_THROW(loadPreviewDriver(config::Node(yaml, "preview_driver.yaml")), config::ConfigError);
+  EXPECT_THROW(loadPreviewDriver(config::Node(yaml, "preview_driver.yaml"), kConfig),
+               config::ConfigError);
 }
 
 }  // namespace

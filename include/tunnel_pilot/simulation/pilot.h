@@ -1,11 +1,12 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "tunnel_pilot/bridge/can_bridge.h"
 #include "tunnel_pilot/drivers/motion_history.h"
-#include "tunnel_pilot/drivers/preview_driver.h"
+#include "tunnel_pilot/drivers/preview_parameters.h"
 #include "tunnel_pilot/simulation/perception_chain.h"
 #include "tunnel_pilot/supervision/arbiter.h"
 
@@ -56,7 +57,7 @@ class Pilot {
 
   geometry::Pose sensor_in_base_;
   PerceptionChain perception_;
-  drivers::PreviewDriver driver_;
+  std::unique_ptr<drivers::PathDriver> driver_;
   supervision::Arbiter arbiter_;
   bridge::CanBridge bridge_;
   drivers::MotionHistory history_;

@@ -21,6 +21,8 @@ enum class Stream : std::uint64_t {
   kWander = 9,
   kAccelerometer = 10,
   kArticulationRate = 11,
+  kScene = 12,
+  kTraining = 13,
 };
 
 /// Seed of one stream of one scenario seed (SplitMix64 of both, Steele, Lea & Flood 2014).
