@@ -155,6 +155,17 @@ void PreviewPlanner::shift(double elapsed) {
   for (std::size_t k = 0; k + 1 < kStages; ++k) rates_[k] += steps * (rates_[k + 1] - rates_[k]);
 }
 
+PathState PreviewPlanner::plannedAt(double time) const {
+  const double steps = std::clamp(time / step_, 0.0, static_cast<double>(kStages));
+  const auto k = std::min(static_cast<std::size_t>(steps), kStages - 1);
+  const double share = steps - static_cast<double>(k);
+  const auto between = [share](double a, double b) { return a + share * (b - a); };
+  const PathState& a = states_[k];
+  const PathState& b = states_[k + 1];
+  return {between(a.s, b.s), between(a.offset, b.offset), between(a.heading_error, b.heading_error),
+          between(a.articulation, b.articulation), between(a.command, b.command)};
+}
+
 double PreviewPlanner::plan(const PathState& now, const geometry::Path& path, double speed,
                             const YawResponse& believed, double elapsed) {
   shift(elapsed);

@@ -31,7 +31,9 @@ void ClosedLoop::step() {
     pilot_.tick(simulator_.now());
     next_tick_ += fromSeconds(1.0 / Pilot::kTickRate);
   }
-  if (events.truth && driving_) record();
+  if (!events.truth || !driving_) return;
+  record();
+  takeTruth();
 }
 
 void ClosedLoop::driveUp(double speed) {

@@ -26,6 +26,7 @@ class ClosedLoop {
 
   /// What the pilot is told of a scan.
   virtual void takeScan(const geometry::Scan& scan) = 0;
+  virtual void takeTruth() {}  ///< recorded, while driving
   /// Called with every new truth once the truck obeys.
   void record();
 

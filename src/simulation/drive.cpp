@@ -7,16 +7,18 @@ constexpr double kOpenEnd = 30.0;  // an open line is driven up to so far before
 
 PilotParameters withTopSpeed(PilotParameters parameters, double top_speed) {
   parameters.preview_driver.speed = top_speed;
+  parameters.lidar_driver.speed = top_speed;
   return parameters;
 }
 
 class Drive : public ClosedLoop {
  public:
-  Drive(const DriveExperiment& drive, const Scenario& scenario, const Setup& setup, std::uint64_t seed,
-        bool reversed)
+  Drive(const DriveExperiment& drive, const Scenario& scenario, const Setup& setup,
+        const EpisodePlan& plan, DriveObserver* observer)
       : ClosedLoop(scenario, setup, withTopSpeed(setup.pilot, drive.top_speed),
-                   world::loadWorld(drive.world_file, {seed, reversed}), seed),
-        drive_(drive) {
+                   world::loadWorld(drive.world_file, {plan.seed, plan.reversed}), plan.seed),
+        drive_(drive),
+        observer_(observer) {
     const double length = simulator_.world().design_line.length();
     if (drive.station <= length) return;
     throw config::ConfigError(scenario.file + ": 'experiment.station' [m] lies beyond the end of the " +
@@ -46,6 +48,7 @@ class Drive : public ClosedLoop {
     const Truth& truth = simulator_.truthOfScan();
     perception_.push_back(
         comparePerception(pilot_.tunnel().state, truth, simulator_.world().widthAt(truth.station)));
+    if (observer_) observer_->afterScan(simulator_, pilot_);
   }
 
   std::string driveOn() {
@@ -74,15 +77,20 @@ class Drive : public ClosedLoop {
 
   static constexpr const char* kCompleted = "way driven";
 
+  void takeTruth() override {
+    if (observer_) observer_->afterTruth(simulator_);
+  }
+
   DriveExperiment drive_;
+  DriveObserver* observer_;
   std::vector<PerceptionSample> perception_;
 };
 
 }  // namespace
 
 EpisodeResult runDrive(const DriveExperiment& drive, const Scenario& scenario, const Setup& setup,
-                       std::uint64_t seed, bool reversed) {
-  return Drive(drive, scenario, setup, seed, reversed).run();
+                       const EpisodePlan& plan, DriveObserver* observer) {
+  return Drive(drive, scenario, setup, plan, observer).run();
 }
 
 }  // namespace tunnel_pilot::simulation

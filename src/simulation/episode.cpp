@@ -31,12 +31,13 @@ bool bothDirections(const Experiment& experiment) {
   return false;
 }
 
-EpisodeResult runExperiment(const Scenario& scenario, const Setup& setup, const EpisodePlan& plan) {
+EpisodeResult runExperiment(const Scenario& scenario, const Setup& setup, const EpisodePlan& plan,
+                            DriveObserver* observer) {
   return std::visit(
       [&](const auto& experiment) {
         using Kind = std::decay_t<decltype(experiment)>;
         if constexpr (std::is_same_v<Kind, DriveExperiment>) {
-          return runDrive(experiment, scenario, setup, plan.seed, plan.reversed);
+          return runDrive(experiment, scenario, setup, plan, observer);
         } else if constexpr (std::is_same_v<Kind, SteadyTurnExperiment>) {
           return runSteadyTurn(experiment, scenario, setup, plan.seed);
         } else if constexpr (std::is_same_v<Kind, LaneChangeExperiment>) {
@@ -100,8 +101,9 @@ std::vector<EpisodePlan> episodePlans(const Scenario& scenario, int seeds) {
   return plans;
 }
 
-EpisodeResult runEpisode(const Scenario& scenario, const Setup& setup, const EpisodePlan& plan) {
-  EpisodeResult result = runExperiment(scenario, setup, plan);
+EpisodeResult runEpisode(const Scenario& scenario, const Setup& setup, const EpisodePlan& plan,
+                         DriveObserver* observer) {
+  EpisodeResult result = runExperiment(scenario, setup, plan, observer);
   result.seed = plan.seed;
   result.reversed = plan.reversed;
   return result;

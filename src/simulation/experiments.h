@@ -17,7 +17,7 @@ PerceptionSample comparePerception(const perception::TunnelState& measured, cons
 
 // One episode of each kind of experiment; `reversed` where there is a direction.
 EpisodeResult runDrive(const DriveExperiment& drive, const Scenario& scenario, const Setup& setup,
-                       std::uint64_t seed, bool reversed);
+                       const EpisodePlan& plan, DriveObserver* observer);
 EpisodeResult runSteadyTurn(const SteadyTurnExperiment& turn, const Scenario& scenario,
                             const Setup& setup, std::uint64_t seed);
 EpisodeResult runLaneChange(const LaneChangeExperiment& change, const Scenario& scenario,

@@ -11,7 +11,7 @@ constexpr Stamp kDecisionPeriod = std::chrono::milliseconds(20);
 
 std::vector<std::string> pilotFiles(const std::string& config_folder) {
   std::vector<std::string> files = perceptionFiles(config_folder);
-  for (const char* stage : {"preview_driver", "arbiter", "can_bridge"}) {
+  for (const char* stage : {"preview_driver", "lidar_driver", "arbiter", "can_bridge"}) {
     files.push_back(config_folder + "/" + stage + ".yaml");
   }
   return files;
@@ -19,8 +19,11 @@ std::vector<std::string> pilotFiles(const std::string& config_folder) {
 
 PilotParameters loadPilot(const std::string& config_folder) {
   const std::string folder = config_folder + "/";
-  return {loadPerception(perceptionFiles(config_folder)),
+  return {DriverChoice::kPreviewDriver,
+          loadPerception(perceptionFiles(config_folder)),
           drivers::loadPreviewDriver(config::loadFile(folder + "preview_driver.yaml"), config_folder),
+          drivers::loadLidarDriver(config::loadFile(folder + "lidar_driver.yaml"), config_folder),
+          nullptr,
           supervision::loadArbiter(config::loadFile(folder + "arbiter.yaml")),
           bridge::loadBridge(config::loadFile(folder + "can_bridge.yaml"))};
 }
@@ -28,9 +31,15 @@ PilotParameters loadPilot(const std::string& config_folder) {
 Pilot::Pilot(const PilotParameters& parameters, const vehicle::TruckParameters& truck, can::Bus& bus)
     : sensor_in_base_{truck.geometry.lidar_x, truck.geometry.lidar_y, 0.0},
       perception_(parameters.perception),
-      driver_(drivers::makePreviewDriver(parameters.preview_driver, truck.geometry)),
       arbiter_(parameters.arbiter, truck),
-      bridge_(parameters.bridge, truck.geometry, bus) {}
+      bridge_(parameters.bridge, truck.geometry, bus) {
+  if (parameters.driver != DriverChoice::kLidarDriver) {
+    preview_driver_ = drivers::makePreviewDriver(parameters.preview_driver, truck.geometry);
+  }
+  if (parameters.driver != DriverChoice::kPreviewDriver) {
+    lidar_driver_.emplace(parameters.lidar_driver, truck.geometry, *parameters.network);
+  }
+}
 
 void Pilot::takeScan(const geometry::Scan& scan, Stamp now) {
   takeMotion(now);
@@ -40,6 +49,10 @@ void Pilot::takeScan(const geometry::Scan& scan, Stamp now) {
   arbiter_.setPoints(perception_.filtered().points->points, scan.stamp, now);
   arbiter_.setWalls(perception_.walls(), now);
   tunnel_ = *tunnel;
+  if (lidar_driver_) {
+    lidar_proposal_ = lidar_driver_->propose(perception_.filtered().network_scan, bridge_.motion(), now);
+    arbiter_.setProposal(supervision::Source::kLidarDriver, lidar_proposal_, now);
+  }
   drive(now);
 }
 
@@ -52,8 +65,10 @@ void Pilot::takeTunnel(const perception::Tunnel& tunnel, Stamp now) {
 
 void Pilot::drive(Stamp now) {
   arbiter_.setTunnel(tunnel_, now);
-  proposal_ = driver_->propose(tunnel_, bridge_.motion(), now);
-  arbiter_.setProposal(supervision::Source::kPreviewDriver, proposal_, now);
+  if (preview_driver_) {
+    preview_proposal_ = preview_driver_->propose(tunnel_, bridge_.motion(), now);
+    arbiter_.setProposal(supervision::Source::kPreviewDriver, preview_proposal_, now);
+  }
   decide(now);
 }
 

@@ -47,6 +47,8 @@ class PreviewPlanner {
   void reset();
 
   double cost() const { return cost_; }  ///< of the last plan
+  /// The planned state `time` [s] after the last plan's start, interpolated; clamped to the horizon.
+  PathState plannedAt(double time) const;
 
  private:
   using Vector = Eigen::Vector4d;  ///< (offset, heading error, articulation, command)

@@ -38,9 +38,18 @@ struct EpisodePlan {
 /// All episodes of a scenario: `seeds` seeds from its first one, each in the directions it asks for.
 std::vector<EpisodePlan> episodePlans(const Scenario& scenario, int seeds);
 
-/// Runs one episode. Depends on its arguments alone. Throws config::ConfigError when the scenario's
+/// Watches a drive from outside while the pilot drives.
+class DriveObserver {
+ public:
+  virtual ~DriveObserver() = default;
+  virtual void afterScan(const Simulator& simulator, const Pilot& pilot) = 0;  ///< pilot has answered it
+  virtual void afterTruth(const Simulator& simulator) = 0;                     ///< truth() is new
+};
+
+/// Runs one episode; a drive tells its observer. Depends on its arguments alone. Throws config::ConfigError when the scenario's
 /// world cannot be read.
-EpisodeResult runEpisode(const Scenario& scenario, const Setup& setup, const EpisodePlan& plan);
+EpisodeResult runEpisode(const Scenario& scenario, const Setup& setup, const EpisodePlan& plan,
+                         DriveObserver* observer = nullptr);
 
 /// Runs episodes on `jobs` threads and returns them in the order of their plans; `progress` is called
 /// with the number done, from one thread at a time. The first exception of an episode is thrown on.

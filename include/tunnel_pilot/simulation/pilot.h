@@ -1,10 +1,12 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "tunnel_pilot/bridge/can_bridge.h"
+#include "tunnel_pilot/drivers/lidar_driver.h"
 #include "tunnel_pilot/drivers/motion_history.h"
 #include "tunnel_pilot/drivers/preview_parameters.h"
 #include "tunnel_pilot/simulation/perception_chain.h"
@@ -12,10 +14,16 @@
 
 namespace tunnel_pilot::simulation {
 
+/// Which drivers propose.
+enum class DriverChoice { kPreviewDriver, kLidarDriver, kAll };
+
 /// The parameters of the pilot's stages, from the files of the config folder.
 struct PilotParameters {
+  DriverChoice driver = DriverChoice::kPreviewDriver;
   PerceptionParameters perception;
   drivers::PreviewDriverParameters preview_driver;
+  drivers::LidarDriverParameters lidar_driver;
+  std::shared_ptr<const neural::NetworkFile> network;  ///< the lidar driver's; none: it does not propose
   supervision::ArbiterParameters arbiter;
   bridge::BridgeParameters bridge;
 };
@@ -48,7 +56,9 @@ class Pilot {
   const supervision::Decision& decision() const { return decision_; }
   const perception::Tunnel& tunnel() const { return tunnel_; }
   const PerceptionChain& perception() const { return perception_; }
-  const drivers::Proposal& proposal() const { return proposal_; }
+  const drivers::Proposal& previewProposal() const { return preview_proposal_; }
+  const drivers::Proposal& lidarProposal() const { return lidar_proposal_; }
+  const std::optional<drivers::LidarDriver>& lidarDriver() const { return lidar_driver_; }
 
  private:
   void takeMotion(Stamp now);
@@ -57,12 +67,14 @@ class Pilot {
 
   geometry::Pose sensor_in_base_;
   PerceptionChain perception_;
-  std::unique_ptr<drivers::PathDriver> driver_;
+  std::unique_ptr<drivers::PathDriver> preview_driver_;
+  std::optional<drivers::LidarDriver> lidar_driver_;
   supervision::Arbiter arbiter_;
   bridge::CanBridge bridge_;
   drivers::MotionHistory history_;
   perception::Tunnel tunnel_;
-  drivers::Proposal proposal_;
+  drivers::Proposal preview_proposal_;
+  drivers::Proposal lidar_proposal_;
   supervision::Decision decision_;
   Stamp next_decision_{};
 };

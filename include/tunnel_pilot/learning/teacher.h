@@ -1,0 +1,41 @@
+#pragma once
+
+#include "tunnel_pilot/drivers/preview_driver.h"
+#include "tunnel_pilot/drivers/preview_planner.h"
+#include "tunnel_pilot/geometry/path.h"
+#include "tunnel_pilot/vehicle/truck_parameters.h"
+
+namespace tunnel_pilot::learning {
+
+/// A truck beside a tunnel's design line.
+struct TruckBesideLine {
+  double station = 0.0;            ///< [m]
+  double offset = 0.0;             ///< left of the line [m]
+  double heading_error = 0.0;      ///< [rad]
+  double articulation = 0.0;       ///< [rad]
+  double articulation_rate = 0.0;  ///< [rad/s]
+  double speed = 0.0;              ///< [m/s]
+};
+
+/// The better teacher: knows the design line and the truck's true state, and plans the optimal way on
+/// (PreviewPlanner) until the plan no longer changes. Its answer for a truck is the articulation that a
+/// driver should demand when its demand begins to act on that truck.
+class Teacher {
+ public:
+  Teacher(const drivers::PreviewDriverParameters& parameters, const vehicle::TruckGeometry& truck);
+
+  /// Articulation to demand [rad].
+  double command(const geometry::Path& line, const TruckBesideLine& truck,
+                 const drivers::YawResponse& believed);
+
+  /// The truck moved on for `time` [s] along the line, its articulation going on at its rate.
+  TruckBesideLine movedOn(const geometry::Path& line, const TruckBesideLine& truck,
+                          const drivers::YawResponse& believed, double time) const;
+
+ private:
+  drivers::PreviewDriverParameters parameters_;
+  drivers::TruckResponse response_;
+  drivers::PreviewPlanner planner_;
+};
+
+}  // namespace tunnel_pilot::learning

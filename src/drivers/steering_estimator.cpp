@@ -1,0 +1,126 @@
+#include "tunnel_pilot/drivers/steering_estimator.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tunnel_pilot/drivers/path_model.h"
+
+namespace tunnel_pilot::drivers {
+namespace {
+
+constexpr double kLongestPause = 0.1;     // [s] a command moves no further than in this time
+constexpr double kPredictionStep = 0.03;  // [s]
+constexpr double kSteady = 0.01;          // [rad] nearer to its command, the articulation stands
+// How fast a reversing command crosses the valve's dead band, in its own movements.
+constexpr double kDeadBandGain = 2.0;
+
+double gain(double elapsed, double memory) { return 1.0 - std::exp(-elapsed / std::max(memory, 1e-6)); }
+
+}  // namespace
+
+SteeringEstimatorParameters loadSteeringEstimator(config::Node& node) {
+  SteeringEstimatorParameters p{};
+  config::Node steering = node.child("steering");
+  p.dead_time = steering.number("dead_time", "s", 0.0, 1.0);
+  p.transport_delay = steering.number("transport_delay", "s", 0.0, 0.3);
+  p.lag = steering.number("lag", "s", 0.02, 2.0);
+  p.dead_band = steering.number("dead_band", "rad", 0.0, 0.05);
+  p.lead = steering.number("lead", "rad", 0.01, 1.0);
+  p.max_rate = steering.number("max_rate", "rad/s", 0.01, 2.0);
+  p.max_articulation = steering.number("max_articulation", "rad", 0.1, 1.2);
+  steering.finish();
+  config::Node bias = node.child("articulation_bias");
+  p.bias_time = bias.number("time", "s", 0.1, 100.0);
+  p.max_bias = bias.number("max", "rad", 0.0, 0.1);
+  bias.finish();
+  config::Node yaw = node.child("yaw_response");
+  p.yaw.gain = yaw.number("gain", "1", 0.5, 1.5);
+  p.yaw.gain_deviation = yaw.number("gain_deviation", "1", 0.0, 0.5);
+  p.yaw.disturbance_deviation = yaw.number("disturbance_deviation", "1/m", 0.0, 0.05);
+  p.yaw.memory = yaw.number("memory", "s", 1.0, 1000.0);
+  p.yaw.noise = yaw.number("noise", "rad/s", 1e-3, 1.0);
+  p.yaw.rate_noise = yaw.number("rate_noise", "1", 0.0, 2.0);
+  p.yaw.least_speed = yaw.number("least_speed", "m/s", 0.1, 5.0);
+  yaw.finish();
+  return p;
+}
+
+SteeringEstimator::SteeringEstimator(const SteeringEstimatorParameters& parameters,
+                                     const vehicle::TruckGeometry& geometry)
+    : parameters_(parameters), yaw_(parameters.yaw, geometry) {}
+
+void SteeringEstimator::reset() {
+  last_time_.reset();
+  last_motion_.reset();
+  yaw_.reset();
+  bias_ = 0.0;
+  play_ = 0.0;
+}
+
+void SteeringEstimator::observe(const Motion& motion) {
+  if (!last_motion_) dropCommands(motion.articulation);
+  const double passed = last_motion_ ? toSeconds(motion.stamp - last_motion_->stamp) : 0.0;
+  if (last_motion_ && passed <= 0.0) return;
+  if (passed > kLongestPause) dropCommands(motion.articulation);
+  last_motion_ = motion;
+
+  const double moving = commandActing(motion.stamp) - commanded_articulation_;
+  commanded_articulation_ += gain(passed, parameters_.lag) * moving;
+  if (std::abs(moving) < kSteady) {
+    const double deviation = motion.articulation - commanded_articulation_;
+    bias_ += gain(passed, parameters_.bias_time) * (deviation - bias_);
+    bias_ = std::clamp(bias_, -parameters_.max_bias, parameters_.max_bias);
+  }
+  last_motion_->articulation -= bias_;
+  yaw_.update(*last_motion_, passed);
+}
+
+double SteeringEstimator::articulationAhead(Stamp now) const {
+  double articulation = last_motion_->articulation;
+  const double span = std::clamp(toSeconds(now - last_motion_->stamp), 0.0, 0.3) + toSeconds(delay());
+  const int steps = std::max(1, static_cast<int>(std::ceil(span / kPredictionStep)));
+  const double step = span / steps;
+  const double share = lagShare(step, parameters_.lag);
+  const double most = parameters_.max_rate * step;
+  for (int i = 0; i < steps; ++i) {
+    const double command = commandActing(last_motion_->stamp + fromSeconds((i + 0.5) * step));
+    articulation += std::clamp(share * (command - articulation), -most, most);
+  }
+  return articulation;
+}
+
+double SteeringEstimator::elapsed(Stamp now) const {
+  return last_time_ ? std::clamp(toSeconds(now - *last_time_), 0.0, kLongestPause) : 0.0;
+}
+
+Stamp SteeringEstimator::delay() const {
+  return fromSeconds(parameters_.dead_time + parameters_.transport_delay);
+}
+
+double SteeringEstimator::commandGivenBefore(Stamp time) const {
+  for (std::size_t age = 0; age < given_.size(); ++age) {
+    const Given& given = given_[(newest_ + given_.size() - age) % given_.size()];
+    if (given.time <= time) return given.command;
+  }
+  return given_[(newest_ + 1) % given_.size()].command;  // the oldest
+}
+
+void SteeringEstimator::dropCommands(double articulation) {
+  given_.fill({Stamp::min(), articulation});
+  commanded_articulation_ = articulation;
+  play_ = 0.0;
+}
+
+double SteeringEstimator::give(double command, double meets, Stamp now) {
+  // What leads the articulation by more than the lag explains would only have to be taken back.
+  command = std::clamp(command, meets - parameters_.lead, meets + parameters_.lead);
+  command = std::clamp(command, -parameters_.max_articulation, parameters_.max_articulation);
+  const double half_band = 0.5 * parameters_.dead_band;
+  play_ = std::clamp(play_ + kDeadBandGain * (command - newestCommand()), -half_band, half_band);
+  newest_ = (newest_ + 1) % given_.size();
+  given_[newest_] = {now, command};
+  last_time_ = now;
+  return std::clamp(command + play_, -parameters_.max_articulation, parameters_.max_articulation);
+}
+
+}  // namespace tunnel_pilot::drivers

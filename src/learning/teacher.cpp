@@ -1,0 +1,69 @@
+#include "tunnel_pilot/learning/teacher.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "tunnel_pilot/drivers/path_cursor.h"
+#include "tunnel_pilot/drivers/path_model.h"
+
+namespace tunnel_pilot::learning {
+namespace {
+
+constexpr int kSweeps = 8;
+constexpr double kMoveStep = 0.02;  // [s]
+
+drivers::TruckResponse response(const drivers::PreviewDriverParameters& p,
+                                const vehicle::TruckGeometry& geometry) {
+  return {geometry, p.truck.steering.lag, p.truck.steering.max_rate, std::min(p.truck.steering.max_articulation, geometry.max_articulation),
+          p.truck.slip_compliance};
+}
+
+}  // namespace
+
+Teacher::Teacher(const drivers::PreviewDriverParameters& parameters,
+                 const vehicle::TruckGeometry& truck)
+    : parameters_(parameters),
+      response_(response(parameters, truck)),
+      planner_(response_, parameters.weights, parameters.step) {}
+
+double Teacher::command(const geometry::Path& line, const TruckBesideLine& truck,
+                        const drivers::YawResponse& believed) {
+  const double demand = truck.articulation + parameters_.truck.steering.lag * truck.articulation_rate;
+  const drivers::PathState start{truck.station, truck.offset, truck.heading_error, truck.articulation,
+                                 std::clamp(demand, -parameters_.truck.steering.max_articulation,
+                                            parameters_.truck.steering.max_articulation)};
+  const double speed = std::max(truck.speed, parameters_.planning_speed);
+  planner_.reset();
+  for (int i = 0; i < kSweeps; ++i) planner_.plan(start, line, speed, believed, 0.0);
+  static const double ahead = std::getenv("AHEAD") ? std::atof(std::getenv("AHEAD")) : 1.0;
+  return planner_.plannedAt(ahead * parameters_.truck.steering.lag).command;
+}
+
+TruckBesideLine Teacher::movedOn(const geometry::Path& line, const TruckBesideLine& truck,
+                                 const drivers::YawResponse& believed, double time) const {
+  drivers::PathState state{truck.station, truck.offset, truck.heading_error, truck.articulation, 0.0};
+  const int steps = std::max(1, static_cast<int>(std::ceil(std::abs(time) / kMoveStep)));
+  const double step = time / steps;
+  const double rate = std::clamp(truck.articulation_rate, -parameters_.truck.steering.max_rate, parameters_.truck.steering.max_rate);
+  const double share = drivers::lagShare(std::abs(step), response_.lag) * (step < 0.0 ? -1.0 : 1.0);
+  drivers::PathCursor cursor(line, state.s);
+  double heading = cursor.headingAt(state.s);
+  for (int i = 0; i < steps; ++i) {
+    state.command = std::clamp(state.articulation + parameters_.truck.steering.lag * rate, -parameters_.truck.steering.max_articulation,
+                               parameters_.truck.steering.max_articulation);
+    const double ahead = std::max(1e-3, std::abs(truck.speed * step));
+    const double curvature = (cursor.headingAt(state.s + ahead) - heading) / ahead;
+    state = drivers::advancedOnPath(response_, state, std::cos(state.heading_error), 0.0, truck.speed,
+                                    curvature, believed, step, share);
+    heading = cursor.headingAt(state.s);
+  }
+  TruckBesideLine moved = truck;
+  moved.station = state.s;
+  moved.offset = state.offset;
+  moved.heading_error = state.heading_error;
+  moved.articulation = state.articulation;
+  return moved;
+}
+
+}  // namespace tunnel_pilot::learning
