@@ -22,9 +22,6 @@ class Inference {
   void run(const float* input, float* output);
 
  private:
-  Network network_;
-  std::vector<std::vector<float>> values_;
-  std::vector<float> parameters_;
   std::size_t inputs_, outputs_;
   std::vector<Layer> layers_;
   std::vector<float> parameters_;
