@@ -56,6 +56,7 @@ class Pilot {
   const supervision::Decision& decision() const { return decision_; }
   const perception::Tunnel& tunnel() const { return tunnel_; }
   const PerceptionChain& perception() const { return perception_; }
+  const drivers::PathDriver* previewDriver() const { return preview_driver_.get(); }  ///< or none
   const drivers::Proposal& previewProposal() const { return preview_proposal_; }
   const drivers::Proposal& lidarProposal() const { return lidar_proposal_; }
   const std::optional<drivers::LidarDriver>& lidarDriver() const { return lidar_driver_; }
