@@ -38,10 +38,16 @@ NetworkLawParameters loadNetworkLaw(config::Node node, const std::string& folder
 
 }  // namespace
 
-PreviewDriverParameters loadPreviewDriver(config::Node node, const std::string& folder) {
+PreviewLaw readPreviewLaw(config::Node& node, const std::string& key) {
+  return node.choice(key, {"optimal", "network"}) == "network" ? PreviewLaw::kNetwork
+                                                               : PreviewLaw::kOptimal;
+}
+
+PreviewDriverParameters loadPreviewDriver(config::Node node, const std::string& folder,
+                                          std::optional<PreviewLaw> law) {
   PreviewDriverParameters p{};
-  p.law = node.choice("law", {"optimal", "network"}) == "network" ? PreviewLaw::kNetwork
-                                                                  : PreviewLaw::kOptimal;
+  p.law = readPreviewLaw(node, "law");
+  p.law = law.value_or(p.law);
   p.speed = node.number("speed", "m/s", 0.1, 15.0);
   p.planning_speed = node.number("planning_speed", "m/s", 0.1, 3.0);
   p.preview_time = node.number("preview_time", "s", 0.1, 5.0);

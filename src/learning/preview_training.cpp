@@ -25,8 +25,18 @@ using neural::NetworkFile;
 constexpr double kPi = 3.141592653589793;
 constexpr drivers::PreviewInputs kRange{2.5, 2.5, 2.0, 2.0};  // f_e, y'', y', y of hard driving
 constexpr double kOutputScale = 0.5;                          // [rad]
-constexpr double kSpread = 0.35;     // standard deviation of the imitated situations, of their range
+// Standard deviations of the imitated situations, of their range: half usual ones, half hard ones.
+constexpr double kUsualSpread = 0.1;
+constexpr double kWideSpread = 0.35;
 constexpr double kImitationRate = 0.01;
+// The preview law; found on drives with training seeds.
+constexpr int kLawPasses = 3;
+constexpr double kDamping = 1.2;       // of lateral speed against the pure least mean square
+constexpr double kForesight = 0.1;     // of the error that the present lateral acceleration leads to
+constexpr double kRateShare = 0.3;     // of the time to turn the hinge that counts as delay
+constexpr double kUsualTurning = 0.3;  // that the correction makes up for [s]
+constexpr double kLongestTurning = 5.0;    // [s]
+constexpr double kMostArticulation = 0.8;  // [rad]
 constexpr double kCostPower = 4.0;   // the goal is one for the worst drive
 
 // One lane change with what it takes to drive it.
@@ -142,14 +152,6 @@ NetworkFile emptyNetwork() {
   return file;
 }
 
-// a_y* of the preview law [m/s^2].
-double wantedAcceleration(const drivers::PreviewInputs& inputs, double preview_time) {
-  return 2.0 *
-         (inputs.road_preview - 5.0 / 3.0 * inputs.lateral_position -
-          1.25 * preview_time * inputs.lateral_speed) /
-         (preview_time * preview_time);
-}
-
 std::string record(const PreviewTrainingOptions& options, int kept, const Judgement& judgement) {
   return "imitation of the optimal preview law, " + std::to_string(options.imitation_steps) +
          " steps, seed " + std::to_string(options.seed) + "; then " + std::to_string(options.rounds) +
@@ -163,7 +165,27 @@ std::string record(const PreviewTrainingOptions& options, int kept, const Judgem
 
 }  // namespace
 
-NetworkFile imitatePreviewLaw(double wheelbase, double preview_time, std::uint64_t seed, int steps) {
+double previewLaw(const PreviewTruck& truck, const drivers::PreviewInputs& in) {
+  constexpr double kSpeed = drivers::NeuralPreviewDriver::kNetworkSpeed;
+  const double constant = truck.wheelbase / (kSpeed * kSpeed);  // C_0
+  const double horizon = truck.preview_time;
+  const double square = horizon * horizon;
+  const double of_path = 2.0 * in.road_preview / square;
+  double speed = in.lateral_speed;
+  double wanted = 0.0;
+  for (int pass = 0; pass < kLawPasses; ++pass) {
+    const double error = in.road_preview - 5.0 / 3.0 * in.lateral_position -
+                         kDamping * 1.25 * horizon * speed +
+                         kForesight * (in.road_preview - 0.5 * square * in.lateral_acceleration);
+    wanted = 2.0 * error / square;
+    const double turning = std::abs(constant * (wanted - in.lateral_acceleration)) / truck.max_rate;
+    const double late = kRateShare * std::clamp(turning - kUsualTurning, 0.0, kLongestTurning);
+    speed = in.lateral_speed + 0.5 * late * (in.lateral_acceleration - of_path);
+  }
+  return std::clamp(constant * wanted, -kMostArticulation, kMostArticulation);
+}
+
+NetworkFile imitatePreviewLaw(const PreviewTruck& truck, std::uint64_t seed, int steps) {
   NetworkFile file = emptyNetwork();
   file.network.randomise(seed);
   simulation::Random random(seed, simulation::Stream::kTraining);
@@ -173,18 +195,16 @@ NetworkFile imitatePreviewLaw(double wheelbase, double preview_time, std::uint64
   neural::BatchPass pass(file.network);
   std::vector<double> gradient(file.network.parameters().size());
   std::array<double, neural::BatchPass::kLanes> targets{};
-  constexpr double kSpeed = drivers::NeuralPreviewDriver::kNetworkSpeed;
-  const double constant = wheelbase / (kSpeed * kSpeed) / (kOutputScale);  // C_0 over the output's scale
-  const auto draw = [&] { return std::clamp(kSpread * random.normal(), -1.0, 1.0); };
   for (int step = 0; step < steps; ++step) {
     for (std::size_t lane = 0; lane < targets.size(); ++lane) {
+      const double spread = lane % 2 == 0 ? kUsualSpread : kWideSpread;
       std::array<double, PreviewNetwork::kInputs> x{};
-      for (std::size_t i = 0; i < x.size(); ++i) pass.input(i)[lane] = x[i] = draw();
-      targets[lane] = constant * wantedAcceleration({kRange.road_preview * x[0],
-                                                     kRange.lateral_acceleration * x[1],
-                                                     kRange.lateral_speed * x[2],
-                                                     kRange.lateral_position * x[3]},
-                                                    preview_time);
+      for (std::size_t i = 0; i < x.size(); ++i) {
+        pass.input(i)[lane] = x[i] = std::clamp(spread * random.normal(), -1.0, 1.0);
+      }
+      targets[lane] = previewLaw(truck, {kRange.road_preview * x[0], kRange.lateral_acceleration * x[1],
+                                         kRange.lateral_speed * x[2], kRange.lateral_position * x[3]}) /
+                      kOutputScale;
     }
     pass.forward();
     neural::halfSquaredError(pass.output(0), targets.data(), targets.size(), pass.outputGradient(0));
@@ -201,10 +221,11 @@ NetworkFile trainPreviewNetwork(const PreviewTrainingOptions& options,
   if (options.scenarios.empty()) throw config::ConfigError("no lane changes were named to train on");
   std::vector<Course> courses;
   for (const std::string& file : options.scenarios) courses.push_back(loadCourse(file));
-  const vehicle::TruckGeometry& truck = courses.front().setup.truck.geometry;
-  NetworkFile network = imitatePreviewLaw(truck.front_axle_to_hinge + truck.rear_axle_to_hinge,
-                                          courses.front().setup.pilot.preview_driver.preview_time,
-                                          options.seed, options.imitation_steps);
+  const vehicle::TruckGeometry& geometry = courses.front().setup.truck.geometry;
+  const drivers::PreviewDriverParameters& driver = courses.front().setup.pilot.preview_driver;
+  const PreviewTruck truck{geometry.front_axle_to_hinge + geometry.rear_axle_to_hinge,
+                           driver.truck.steering.max_rate, driver.preview_time};
+  NetworkFile network = imitatePreviewLaw(truck, options.seed, options.imitation_steps);
   NetworkFile best = network;
   Judgement least = judge(courses, best, options);
   int kept = 0;

@@ -17,11 +17,11 @@ std::vector<std::string> pilotFiles(const std::string& config_folder) {
   return files;
 }
 
-PilotParameters loadPilot(const std::string& config_folder) {
+PilotParameters loadPilot(const std::string& config_folder, std::optional<drivers::PreviewLaw> law) {
   const std::string folder = config_folder + "/";
   return {DriverChoice::kPreviewDriver,
           loadPerception(perceptionFiles(config_folder)),
-          drivers::loadPreviewDriver(config::loadFile(folder + "preview_driver.yaml"), config_folder),
+          drivers::loadPreviewDriver(config::loadFile(folder + "preview_driver.yaml"), config_folder, law),
           drivers::loadLidarDriver(config::loadFile(folder + "lidar_driver.yaml"), config_folder),
           nullptr,
           supervision::loadArbiter(config::loadFile(folder + "arbiter.yaml")),

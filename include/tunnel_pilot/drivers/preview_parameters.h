@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "tunnel_pilot/config/node.h"
@@ -35,8 +36,13 @@ struct PreviewDriverParameters {
   std::shared_ptr<const neural::NetworkFile> network;  ///< of the law by it; otherwise none
 };
 
-/// Reads and checks config/preview_driver.yaml, and the network's file if it is to drive; a relative
-/// file name is looked for from `folder`. Throws config::ConfigError.
-PreviewDriverParameters loadPreviewDriver(config::Node node, const std::string& folder);
+/// Reads and checks config/preview_driver.yaml, and the network's file if it is to drive; a relative file
+/// name is looked for from `folder`. A `law` given here takes the place of the file's. Throws
+/// config::ConfigError.
+PreviewDriverParameters loadPreviewDriver(config::Node node, const std::string& folder,
+                                          std::optional<PreviewLaw> law = std::nullopt);
+
+/// The law that a key names: optimal or network. Throws config::ConfigError.
+PreviewLaw readPreviewLaw(config::Node& node, const std::string& key);
 
 }  // namespace tunnel_pilot::drivers

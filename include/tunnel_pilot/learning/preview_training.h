@@ -5,20 +5,20 @@
 #include <string>
 #include <vector>
 
+#include "tunnel_pilot/drivers/preview_network.h"
 #include "tunnel_pilot/neural/network_file.h"
-#include "tunnel_pilot/vehicle/truck_parameters.h"
 
 namespace tunnel_pilot::learning {
 
 struct PreviewTrainingOptions {
   std::vector<std::string> scenarios;  ///< files of the lane changes to drive, with the driver's config
   std::uint64_t seed = 1;              ///< of first weights and imitated situations
-  int imitation_steps = 20000;         ///< of Adam, 32 situations each
+  int imitation_steps = 40000;         ///< of Adam, 32 situations each
   int rounds = 6;                      ///< of drives
   int drives = 4;                      ///< of each scenario in a round
   std::uint64_t first_seed = 1000;     ///< of the drives, another one for each
   std::uint64_t validation_seed = 3000;  ///< first of the drives that judge a round
-  int validation_drives = 8;             ///< of each scenario
+  int validation_drives = 12;             ///< of each scenario
   double rate = 0.05;                    ///< eta of a preview time [rad/m]
   double momentum = 0.05;                ///< alpha [1]
   double bound = 0.05;                   ///< of a weight's way in one drive [rad]
@@ -32,9 +32,22 @@ struct PreviewTrainingProgress {
   bool best;     ///< of the rounds so far
 };
 
+/// What the preview law needs of truck and driver.
+struct PreviewTruck {
+  double wheelbase;     ///< l_f + l_r [m]
+  double max_rate;      ///< of the hinge [rad/s]
+  double preview_time;  ///< T_p [s]
+};
+
+/// The articulation that a preview network is to give, at its own speed [rad]. With the least mean square
+/// of path less predicted place over T_p, more damping b and some foresight c by the present acceleration,
+///   a_y* = 2 [f_e - (5/3) y - b (5/4) T_p y' + c (f_e - T_p^2 y'' / 2)] / T_p^2,   u = C_0 a_y*
+/// where the hinge needs long to turn to u at max_rate, the present acceleration lasts on: y' is then
+/// what it will be after a share of that time. This is what the network's hidden nodes are for.
+double previewLaw(const PreviewTruck& truck, const drivers::PreviewInputs& inputs);
+
 /// Trains the 4-10-1 network of a preview driver in two phases:
-/// 1. imitation of the preview law that it stands for, the least mean square of path less predicted place
-///    over the preview time T_p:  a_y* = 2 [f_e - (5/3) y - (5/4) T_p y'] / T_p^2,  u = C_0 a_y*;
+/// 1. imitation of previewLaw() in drawn situations;
 /// 2. the paper's online rule (PreviewNetwork) in closed loop: whole pilot, dynamic plant, steering with
 ///    its delays, sensor errors, as the scenarios say. Output weights go on from drive to drive; what a
 ///    round ends with is the mean of them over its drives. The round with the least cost on drives with
@@ -45,8 +58,7 @@ neural::NetworkFile trainPreviewNetwork(
     const PreviewTrainingOptions& options,
     const std::function<void(const PreviewTrainingProgress&)>& progress);
 
-/// Phase 1 alone, for a truck with this wheelbase l_f + l_r [m] and T_p [s].
-neural::NetworkFile imitatePreviewLaw(double wheelbase, double preview_time, std::uint64_t seed,
-                                      int steps);
+/// Phase 1 alone.
+neural::NetworkFile imitatePreviewLaw(const PreviewTruck& truck, std::uint64_t seed, int steps);
 
 }  // namespace tunnel_pilot::learning

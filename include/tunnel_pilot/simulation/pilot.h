@@ -31,8 +31,9 @@ struct PilotParameters {
 /// The files that make up PilotParameters.
 std::vector<std::string> pilotFiles(const std::string& config_folder);
 
-/// Throws config::ConfigError.
-PilotParameters loadPilot(const std::string& config_folder);
+/// A preview law given here takes the place of the folder's. Throws config::ConfigError.
+PilotParameters loadPilot(const std::string& config_folder,
+                          std::optional<drivers::PreviewLaw> law = std::nullopt);
 
 /// The whole pilot without ROS: the same classes that the nodelets wrap, called in the order in which
 /// their messages come. Deterministic: time is an argument, and the bus is given.
