@@ -23,21 +23,24 @@ using neural::Layer;
 using neural::NetworkFile;
 
 constexpr double kPi = 3.141592653589793;
-constexpr drivers::PreviewInputs kRange{2.5, 2.5, 2.0, 2.0};  // f_e, y'', y', y of hard driving
-constexpr double kOutputScale = 0.5;                          // [rad]
-// Standard deviations of the imitated situations, of their range: half usual ones, half hard ones.
-constexpr double kUsualSpread = 0.1;
-constexpr double kWideSpread = 0.35;
+// f_e, y'', y', y. Farther from the path than its range, the truck comes back no harder: it could not
+// turn out of it again in time, for its hinge turns slowly.
+constexpr drivers::PreviewInputs kRange{2.5, 2.5, 2.0, 0.12};
+constexpr double kOutputScale = 0.5;  // [rad]
+// Standard deviations of the imitated situations, of their ranges: half usual ones, half hard ones.
+using Spread = std::array<double, PreviewNetwork::kInputs>;
+constexpr Spread kUsualSpread = {0.1, 0.15, 0.1, 0.5};
+constexpr Spread kWideSpread = {0.3, 0.35, 0.3, 0.8};
 constexpr double kImitationRate = 0.01;
 // The preview law; found on drives with training seeds.
 constexpr int kLawPasses = 3;
-constexpr double kDamping = 1.2;       // of lateral speed against the pure least mean square
-constexpr double kForesight = 0.1;     // of the error that the present lateral acceleration leads to
-constexpr double kRateShare = 0.3;     // of the time to turn the hinge that counts as delay
-constexpr double kUsualTurning = 0.3;  // that the correction makes up for [s]
+constexpr double kDamping = 1.2;           // of lateral speed against the pure least mean square
+constexpr double kForesight = 0.1;         // of the error that the present lateral acceleration leads to
+constexpr double kRateShare = 0.5;         // of the time to turn the hinge that counts as delay
+constexpr double kUsualTurning = 0.3;      // that the correction makes up for [s]
 constexpr double kLongestTurning = 5.0;    // [s]
 constexpr double kMostArticulation = 0.8;  // [rad]
-constexpr double kCostPower = 4.0;   // the goal is one for the worst drive
+constexpr double kCostPower = 4.0;         // the goal is one for the worst drive
 
 // One lane change with what it takes to drive it.
 struct Course {
@@ -106,8 +109,8 @@ Judgement judge(std::vector<Course>& courses, const NetworkFile& network,
     for (int i = 0; i < options.validation_drives; ++i) {
       plans.push_back({options.validation_seed + static_cast<std::uint64_t>(i), false});
     }
-    const auto episodes = simulation::runEpisodes(course.scenario, course.setup, plans, options.jobs,
-                                                  [](std::size_t) {});
+    const auto episodes =
+        simulation::runEpisodes(course.scenario, course.setup, plans, options.jobs, [](std::size_t) {});
     for (const simulation::EpisodeResult& episode : episodes) {
       const bool completed = episode.metrics.at("completed") == 1.0;
       const double error = completed ? episode.metrics.at("path_error_max") / course.goal
@@ -197,10 +200,10 @@ NetworkFile imitatePreviewLaw(const PreviewTruck& truck, std::uint64_t seed, int
   std::array<double, neural::BatchPass::kLanes> targets{};
   for (int step = 0; step < steps; ++step) {
     for (std::size_t lane = 0; lane < targets.size(); ++lane) {
-      const double spread = lane % 2 == 0 ? kUsualSpread : kWideSpread;
+      const Spread& spread = lane % 2 == 0 ? kUsualSpread : kWideSpread;
       std::array<double, PreviewNetwork::kInputs> x{};
       for (std::size_t i = 0; i < x.size(); ++i) {
-        pass.input(i)[lane] = x[i] = std::clamp(spread * random.normal(), -1.0, 1.0);
+        pass.input(i)[lane] = x[i] = std::clamp(spread[i] * random.normal(), -1.0, 1.0);
       }
       targets[lane] = previewLaw(truck, {kRange.road_preview * x[0], kRange.lateral_acceleration * x[1],
                                          kRange.lateral_speed * x[2], kRange.lateral_position * x[3]}) /

@@ -19,13 +19,14 @@ std::vector<std::string> pilotFiles(const std::string& config_folder) {
 
 PilotParameters loadPilot(const std::string& config_folder, std::optional<drivers::PreviewLaw> law) {
   const std::string folder = config_folder + "/";
-  return {DriverChoice::kPreviewDriver,
-          loadPerception(perceptionFiles(config_folder)),
-          drivers::loadPreviewDriver(config::loadFile(folder + "preview_driver.yaml"), config_folder, law),
-          drivers::loadLidarDriver(config::loadFile(folder + "lidar_driver.yaml"), config_folder),
-          nullptr,
-          supervision::loadArbiter(config::loadFile(folder + "arbiter.yaml")),
-          bridge::loadBridge(config::loadFile(folder + "can_bridge.yaml"))};
+  return {
+      DriverChoice::kPreviewDriver,
+      loadPerception(perceptionFiles(config_folder)),
+      drivers::loadPreviewDriver(config::loadFile(folder + "preview_driver.yaml"), config_folder, law),
+      drivers::loadLidarDriver(config::loadFile(folder + "lidar_driver.yaml"), config_folder),
+      nullptr,
+      supervision::loadArbiter(config::loadFile(folder + "arbiter.yaml")),
+      bridge::loadBridge(config::loadFile(folder + "can_bridge.yaml"))};
 }
 
 Pilot::Pilot(const PilotParameters& parameters, const vehicle::TruckParameters& truck, can::Bus& bus)

@@ -18,7 +18,8 @@ const std::string kConfig = std::string(TUNNEL_PILOT_SOURCE_DIR) + "/config/";
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 PreviewDriverParameters parameters() {
-  return loadPreviewDriver(config::loadFile(kConfig + "preview_driver.yaml"), kConfig, PreviewLaw::kNetwork);
+  return loadPreviewDriver(config::loadFile(kConfig + "preview_driver.yaml"), kConfig,
+                           PreviewLaw::kNetwork);
 }
 
 vehicle::TruckParameters truck() { return vehicle::loadTruck(kConfig + "truck.yaml"); }
@@ -56,7 +57,8 @@ double settled(NeuralPreviewDriver& d, double offset, double curvature, double a
   return angle;
 }
 
-// 10 m aside in a half-cosine of 24 m, after 30 m straight, at 15 km/h: loaded, class E, sensed with noise.
+// 10 m aside in a half-cosine of 24 m, after 30 m straight, at 15 km/h: loaded, class E, sensed with
+// noise.
 SensedPathDrive::Result laneChange(const PreviewDriverParameters& p, double duration = 20.0) {
   const auto y = [](double x) {
     return 5.0 * (1.0 - std::cos(M_PI * std::clamp((x - 30.0) / 24.0, 0.0, 1.0)));

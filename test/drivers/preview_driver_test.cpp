@@ -94,8 +94,9 @@ TEST(PreviewDriver, ItsCommandNeverMovesFasterThanTheSteering) {
         d.propose(tunnelAt(time, offset), motionAt(time + 0.03, last), fromSeconds(time + 0.05));
     ASSERT_TRUE(proposal.valid);
     if (i > 0) {
-      EXPECT_LE(std::abs(proposal.articulation_angle - last),
-                parameters().truck.steering.max_rate * 0.03 + parameters().truck.steering.dead_band + 1e-9);
+      EXPECT_LE(
+          std::abs(proposal.articulation_angle - last),
+          parameters().truck.steering.max_rate * 0.03 + parameters().truck.steering.dead_band + 1e-9);
     }
     last = proposal.articulation_angle;
   }
@@ -108,7 +109,8 @@ TEST(PreviewDriver, StaysNearTheArticulationWhileSomeoneElseSteers) {
     const Proposal proposal =
         d.propose(tunnelAt(time, 1.0), motionAt(time + 0.03, 0.3), fromSeconds(time + 0.05));
     EXPECT_NEAR(proposal.articulation_angle, 0.3,
-                2.0 * parameters().truck.steering.lead + parameters().truck.steering.max_bias + parameters().truck.steering.dead_band);
+                2.0 * parameters().truck.steering.lead + parameters().truck.steering.max_bias +
+                    parameters().truck.steering.dead_band);
   }
 }
 
@@ -171,7 +173,8 @@ TEST(PreviewDriverParameters, OutOfRangeIsRefusedByName) {
 TEST(PreviewDriverParameters, UnknownKeyIsRefused) {
   YAML::Node yaml = YAML::LoadFile(kConfig + "preview_driver.yaml");
   yaml["sped"] = 3.0;
-  EXPECT_THROW(loadPreviewDriver(config::Node(yaml, "preview_driver.yaml"), kConfig), config::ConfigError);
+  EXPECT_THROW(loadPreviewDriver(config::Node(yaml, "preview_driver.yaml"), kConfig),
+               config::ConfigError);
 }
 
 }  // namespace

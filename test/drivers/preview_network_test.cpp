@@ -18,13 +18,13 @@ constexpr PreviewInputs kSomewhere{0.4, 0.3, -0.2, 0.1};
 constexpr AdaptationParameters kLearning{true, 0.05, 0.3, 0.04};
 
 neural::NetworkFile file() {
-  neural::NetworkFile file{
-      "preview",
-      neural::Network({Layer::dense(4, 10, Activation::kSigmoid), Layer::dense(10, 1, Activation::kLinear)}),
-      previewInputGroups({2.5, 2.5, 2.0, 2.0}),
-      {},
-      "",
-      ""};
+  neural::NetworkFile file{"preview",
+                           neural::Network({Layer::dense(4, 10, Activation::kSigmoid),
+                                            Layer::dense(10, 1, Activation::kLinear)}),
+                           previewInputGroups({2.5, 2.5, 2.0, 2.0}),
+                           {},
+                           "",
+                           ""};
   file.output.meaning = "articulation_angle";
   file.output.unit = "rad";
   file.output.scale = 0.5;

@@ -40,9 +40,11 @@ TEST(PreviewLaw, SteersBackEarlierTheLongerTheHingeWillTurn) {
 
 TEST(PreviewTraining, ImitatesThePreviewLaw) {
   drivers::PreviewNetwork network(imitatePreviewLaw(kTruck, 1, 8000), {});
-  for (const drivers::PreviewInputs& inputs :
-       {drivers::PreviewInputs{0.4, 0.0, 0.0, 0.0}, {0.0, 0.6, 0.0, 0.0}, {0.0, 0.0, 0.3, 0.0},
-        {0.0, 0.0, 0.0, -0.2}, {0.6, 0.8, 0.1, -0.1}}) {
+  for (const drivers::PreviewInputs& inputs : {drivers::PreviewInputs{0.4, 0.0, 0.0, 0.0},
+                                               {0.0, 0.6, 0.0, 0.0},
+                                               {0.0, 0.0, 0.3, 0.0},
+                                               {0.0, 0.0, 0.0, -0.2},
+                                               {0.6, 0.8, 0.1, -0.1}}) {
     EXPECT_NEAR(network.run(inputs), previewLaw(kTruck, inputs), 0.03);
   }
 }
@@ -50,12 +52,12 @@ TEST(PreviewTraining, ImitatesThePreviewLaw) {
 TEST(PreviewTraining, ASmallTrainingDrivesAndComesOutTheSameTwice) {
   std::vector<PreviewTrainingProgress> told;
   const auto once = [&] {
-    return trainPreviewNetwork(smallTraining(),
-                               [&](const PreviewTrainingProgress& progress) { told.push_back(progress); });
+    return trainPreviewNetwork(
+        smallTraining(), [&](const PreviewTrainingProgress& progress) { told.push_back(progress); });
   };
   const neural::NetworkFile first = once();
   ASSERT_EQ(told.size(), 2U);
-  EXPECT_LT(told[0].worst, 1.5);  // the imitation alone drives the lane change
+  EXPECT_LT(told[0].worst, 1.5);          // the imitation alone drives the lane change
   EXPECT_NE(told[1].cost, told[0].cost);  // drives have changed the weights
   EXPECT_EQ(once().network.parameters(), first.network.parameters());
 }
@@ -63,11 +65,9 @@ TEST(PreviewTraining, ASmallTrainingDrivesAndComesOutTheSameTwice) {
 TEST(PreviewTraining, RefusesWhatIsNoLaneChange) {
   PreviewTrainingOptions options = smallTraining();
   options.scenarios = {kScenarios + "default_drift.yaml"};
-  EXPECT_THROW(trainPreviewNetwork(options, [](const PreviewTrainingProgress&) {}),
-               config::ConfigError);
+  EXPECT_THROW(trainPreviewNetwork(options, [](const PreviewTrainingProgress&) {}), config::ConfigError);
   options.scenarios.clear();
-  EXPECT_THROW(trainPreviewNetwork(options, [](const PreviewTrainingProgress&) {}),
-               config::ConfigError);
+  EXPECT_THROW(trainPreviewNetwork(options, [](const PreviewTrainingProgress&) {}), config::ConfigError);
 }
 
 }  // namespace

@@ -36,8 +36,8 @@ struct PreviewDriverParameters {
   std::shared_ptr<const neural::NetworkFile> network;  ///< of the law by it; otherwise none
 };
 
-/// Reads and checks config/preview_driver.yaml, and the network's file if it is to drive; a relative file
-/// name is looked for from `folder`. A `law` given here takes the place of the file's. Throws
+/// Reads and checks config/preview_driver.yaml, and the network's file if it is to drive; a relative
+/// file name is looked for from `folder`. A `law` given here takes the place of the file's. Throws
 /// config::ConfigError.
 PreviewDriverParameters loadPreviewDriver(config::Node node, const std::string& folder,
                                           std::optional<PreviewLaw> law = std::nullopt);

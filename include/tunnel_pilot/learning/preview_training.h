@@ -18,8 +18,8 @@ struct PreviewTrainingOptions {
   int drives = 4;                      ///< of each scenario in a round
   std::uint64_t first_seed = 1000;     ///< of the drives, another one for each
   std::uint64_t validation_seed = 3000;  ///< first of the drives that judge a round
-  int validation_drives = 12;             ///< of each scenario
-  double rate = 0.05;                    ///< eta of a preview time [rad/m]
+  int validation_drives = 24;            ///< of each scenario
+  double rate = 0.02;                    ///< eta of a preview time [rad/m]
   double momentum = 0.05;                ///< alpha [1]
   double bound = 0.05;                   ///< of a weight's way in one drive [rad]
   int jobs = 2;                          ///< threads of the validation
@@ -39,8 +39,9 @@ struct PreviewTruck {
   double preview_time;  ///< T_p [s]
 };
 
-/// The articulation that a preview network is to give, at its own speed [rad]. With the least mean square
-/// of path less predicted place over T_p, more damping b and some foresight c by the present acceleration,
+/// The articulation that a preview network is to give, at its own speed [rad]. With the least mean
+/// square of path less predicted place over T_p, more damping b and some foresight c by the present
+/// acceleration,
 ///   a_y* = 2 [f_e - (5/3) y - b (5/4) T_p y' + c (f_e - T_p^2 y'' / 2)] / T_p^2,   u = C_0 a_y*
 /// where the hinge needs long to turn to u at max_rate, the present acceleration lasts on: y' is then
 /// what it will be after a share of that time. This is what the network's hidden nodes are for.
@@ -52,8 +53,8 @@ double previewLaw(const PreviewTruck& truck, const drivers::PreviewInputs& input
 ///    its delays, sensor errors, as the scenarios say. Output weights go on from drive to drive; what a
 ///    round ends with is the mean of them over its drives. The round with the least cost on drives with
 ///    other seeds is kept, which may be the imitation itself.
-/// Deterministic. Throws config::ConfigError for scenarios that cannot be read or are no lane changes with
-/// a goal for path_error_max, neural::Diverged when the imitation diverges.
+/// Deterministic. Throws config::ConfigError for scenarios that cannot be read or are no lane changes
+/// with a goal for path_error_max, neural::Diverged when the imitation diverges.
 neural::NetworkFile trainPreviewNetwork(
     const PreviewTrainingOptions& options,
     const std::function<void(const PreviewTrainingProgress&)>& progress);

@@ -46,8 +46,8 @@ class DriveObserver {
   virtual void afterTruth(const Simulator& simulator) = 0;  ///< truth() is new; drives only
 };
 
-/// Runs one episode; drives and lane changes tell their observer. Depends on its arguments alone. Throws config::ConfigError when the scenario's
-/// world cannot be read.
+/// Runs one episode; drives and lane changes tell their observer. Depends on its arguments alone. Throws
+/// config::ConfigError when the scenario's world cannot be read.
 EpisodeResult runEpisode(const Scenario& scenario, const Setup& setup, const EpisodePlan& plan,
                          DriveObserver* observer = nullptr);
 

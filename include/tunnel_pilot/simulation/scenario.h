@@ -90,8 +90,8 @@ struct Goal {
 struct Scenario {
   std::string name;
   std::string title;
-  std::string file;           ///< it was read from
-  std::string config_folder;  ///< the rooms' YAML files
+  std::string file;                                ///< it was read from
+  std::string config_folder;                       ///< the rooms' YAML files
   std::optional<drivers::PreviewLaw> preview_law;  ///< none: what preview_driver.yaml says
   std::uint64_t first_seed;
   int seeds;
