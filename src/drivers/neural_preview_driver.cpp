@@ -62,6 +62,7 @@ Proposal NeuralPreviewDriver::propose(const perception::Tunnel& tunnel, const Mo
   network_.learn(-start->offset, elapsed / parameters_.preview_time);
   const double corrected = start->articulation + parameters_.network_law.correction_time *
                                                      turnTowards(wanted, start->articulation, speed);
+  if (!std::isfinite(corrected)) return proposal;
   const double most = predictor_.truck().max_rate * elapsed;
 
   proposal.valid = true;

@@ -79,6 +79,15 @@ TEST(PreviewDriver, ProposesNothingFromNumbersThatAreNone) {
   EXPECT_FALSE(driver().propose(tunnelAt(1.0), motion, fromSeconds(1.05)).valid);
 }
 
+TEST(PreviewDriver, SteersATruckWithoutAnyDelayToo) {
+  PreviewDriverParameters p = parameters();
+  p.truck.steering.dead_time = 0.0;
+  p.truck.steering.transport_delay = 0.0;
+  PreviewDriver d(p, vehicle::loadTruck(kConfig + "truck.yaml").geometry);
+  const Proposal proposal = d.propose(tunnelAt(1.0, 0.5), motionAt(1.0), fromSeconds(1.0));
+  EXPECT_TRUE(std::isfinite(proposal.articulation_angle));
+}
+
 TEST(PreviewDriver, StartsFromTheMeasuredArticulation) {
   const Proposal proposal = driver().propose(tunnelAt(1.0), motionAt(1.03, 0.2), fromSeconds(1.05));
   EXPECT_NEAR(proposal.articulation_angle, 0.2, 1e-9);
