@@ -34,16 +34,17 @@ TEST(PreviewLaw, SteersBackEarlierTheLongerTheHingeWillTurn) {
   // Drifting to the right of a straight path in a hard right bend.
   PreviewTruck slow = kTruck;
   slow.max_rate = 0.1;
-  const drivers::PreviewInputs inputs{0.0, -1.2, -0.3, -0.1};
+  const drivers::PreviewInputs inputs{0.0, -0.4, -0.05, -0.02};
   EXPECT_GT(previewLaw(slow, inputs), previewLaw(kTruck, inputs) + 0.01);
 }
 
 TEST(PreviewTraining, ImitatesThePreviewLaw) {
-  drivers::PreviewNetwork network(imitatePreviewLaw(kTruck, 1, 8000), {});
+  drivers::PreviewNetwork network(imitatePreviewLaw(kTruck, 1, PreviewTrainingOptions().imitation_steps),
+                                  {});
   for (const drivers::PreviewInputs& inputs : {drivers::PreviewInputs{0.4, 0.0, 0.0, 0.0},
                                                {0.0, 0.6, 0.0, 0.0},
                                                {0.0, 0.0, 0.3, 0.0},
-                                               {0.0, 0.0, 0.0, -0.2},
+                                               {0.0, 0.0, 0.0, -0.1},
                                                {0.6, 0.8, 0.1, -0.1}}) {
     EXPECT_NEAR(network.run(inputs), previewLaw(kTruck, inputs), 0.03);
   }
