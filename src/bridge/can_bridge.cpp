@@ -31,6 +31,8 @@ bool tellsDegradation(Reason reason) {
     case Reason::kMotionStale:
     case Reason::kLimitsHit:
     case Reason::kSpeedImplausible:
+    case Reason::kLowConfidence:
+    case Reason::kDriversDisagree:
       return true;
     default:
       return false;

@@ -3,6 +3,19 @@
 #include <cmath>
 
 namespace tunnel_pilot::learning {
+namespace {
+
+TruckBesideLine between(const TruckBesideLine& a, const TruckBesideLine& b, double share) {
+  const auto mix = [share](double from, double to) { return from + share * (to - from); };
+  return {mix(a.station, b.station),
+          mix(a.offset, b.offset),
+          mix(a.heading_error, b.heading_error),
+          mix(a.articulation, b.articulation),
+          mix(a.articulation_rate, b.articulation_rate),
+          mix(a.speed, b.speed)};
+}
+
+}  // namespace
 
 DriveCollector::DriveCollector(const simulation::Setup& setup, std::uint32_t tunnel)
     : teacher_(setup.pilot.preview_driver, setup.truck.geometry),
@@ -26,24 +39,26 @@ void DriveCollector::afterScan(const simulation::Simulator& simulator, const sim
 
 void DriveCollector::afterTruth(const simulation::Simulator& simulator) {
   const simulation::Truth& truth = simulator.truth();
+  const TruckBesideLine now{truth.station,
+                            truth.lateral_offset,
+                            truth.heading_error,
+                            truth.state.articulation,
+                            truth.state.articulation_rate,
+                            truth.state.speed};
   while (!pending_.empty() && pending_.front().due <= truth.stamp) {
-    const TruckBesideLine truck{truth.station,
-                                truth.lateral_offset,
-                                truth.heading_error,
-                                truth.state.articulation,
-                                truth.state.articulation_rate,
-                                truth.state.speed};
-    // The truth is up to a period late: back to the very moment.
-    const Example& seen = pending_.front().example;
-    const drivers::YawResponse believed{static_cast<double>(seen.yaw_gain),
-                                        static_cast<double>(seen.yaw_disturbance)};
-    const TruckBesideLine then = teacher_.movedOn(simulator.world().design_line, truck, believed,
-                                                  toSeconds(pending_.front().due - truth.stamp));
-    Example example = std::move(pending_.front().example);
+    Pending pending = std::move(pending_.front());
     pending_.pop_front();
-    example.label = static_cast<float>(teacher_.command(simulator.world().design_line, then, believed));
+    if (!last_ || pending.due < last_stamp_) continue;
+    Example& example = pending.example;
+    const drivers::YawResponse believed{static_cast<double>(example.yaw_gain),
+                                        static_cast<double>(example.yaw_disturbance)};
+    const double share = toSeconds(pending.due - last_stamp_) / toSeconds(truth.stamp - last_stamp_);
+    example.label = static_cast<float>(teacher_.command(simulator.world().design_line,
+                                                        between(*last_, now, share), believed));
     if (std::isfinite(example.label)) examples_.push_back(std::move(example));
   }
+  last_ = now;
+  last_stamp_ = truth.stamp;
 }
 
 }  // namespace tunnel_pilot::learning

@@ -31,24 +31,17 @@ struct Loss {
   std::size_t count = 0;
 };
 
-// The inputs of examples, one column each, and of their mirror images if wanted behind them.
+// The inputs of examples, one column each, or of their mirror images.
 Eigen::MatrixXf inputsOf(const neural::NetworkFile& file, const DataSet& examples, bool mirrored) {
   drivers::LidarInputs inputs(file.inputs, file.name);
   Eigen::MatrixXf columns(static_cast<Eigen::Index>(inputs.size()),
                           static_cast<Eigen::Index>(examples.size()));
-  std::vector<float> ranges;
   for (std::size_t i = 0; i < examples.size(); ++i) {
-    const Example& example = examples[i];
-    const double sign = mirrored ? -1.0 : 1.0;
-    const drivers::TruckInputs truck{sign * static_cast<double>(example.articulation),
-                                     sign * static_cast<double>(example.articulation_ahead),
-                                     static_cast<double>(example.speed),
-                                     static_cast<double>(example.yaw_gain),
-                                     sign * static_cast<double>(example.yaw_disturbance)};
-    ranges = example.ranges;
-    if (mirrored) std::reverse(ranges.begin(), ranges.end());
-    if (!inputs.fill(ranges, truck, columns.col(static_cast<Eigen::Index>(i)).data()))
+    float* column = columns.col(static_cast<Eigen::Index>(i)).data();
+    if (!inputs.fill(examples[i].ranges, truckInputsOf(examples[i]), column)) {
       throw std::runtime_error("an example without usable ranges");
+    }
+    if (mirrored) inputs.fillMirrored(column);
   }
   return columns;
 }

@@ -42,28 +42,43 @@ double Teacher::command(const geometry::Path& line, const TruckBesideLine& truck
 
 TruckBesideLine Teacher::movedOn(const geometry::Path& line, const TruckBesideLine& truck,
                                  const drivers::YawResponse& believed, double time) const {
+  return moved(line, truck, believed, time, std::nullopt);
+}
+
+TruckBesideLine Teacher::steered(const geometry::Path& line, const TruckBesideLine& truck,
+                                 const drivers::YawResponse& believed, double command,
+                                 double time) const {
+  return moved(line, truck, believed, time, command);
+}
+
+TruckBesideLine Teacher::moved(const geometry::Path& line, const TruckBesideLine& truck,
+                               const drivers::YawResponse& believed, double time,
+                               const std::optional<double>& command) const {
+  const auto& steering = parameters_.truck.steering;
   drivers::PathState state{truck.station, truck.offset, truck.heading_error, truck.articulation, 0.0};
-  const int steps = std::max(1, static_cast<int>(std::ceil(std::abs(time) / kMoveStep)));
+  const int steps = std::max(1, static_cast<int>(std::ceil(time / kMoveStep)));
   const double step = time / steps;
-  const double rate = std::clamp(truck.articulation_rate, -parameters_.truck.steering.max_rate, parameters_.truck.steering.max_rate);
-  const double share = drivers::lagShare(std::abs(step), response_.lag) * (step < 0.0 ? -1.0 : 1.0);
+  const double rate = std::clamp(truck.articulation_rate, -steering.max_rate, steering.max_rate);
+  const double share = drivers::lagShare(step, response_.lag);
   drivers::PathCursor cursor(line, state.s);
   double heading = cursor.headingAt(state.s);
+  TruckBesideLine result = truck;
   for (int i = 0; i < steps; ++i) {
-    state.command = std::clamp(state.articulation + parameters_.truck.steering.lag * rate, -parameters_.truck.steering.max_articulation,
-                               parameters_.truck.steering.max_articulation);
-    const double ahead = std::max(1e-3, std::abs(truck.speed * step));
+    const double demand = command ? *command : state.articulation + steering.lag * rate;
+    state.command = std::clamp(demand, -steering.max_articulation, steering.max_articulation);
+    const double ahead = std::max(1e-3, truck.speed * step);
     const double curvature = (cursor.headingAt(state.s + ahead) - heading) / ahead;
+    const double before = state.articulation;
     state = drivers::advancedOnPath(response_, state, std::cos(state.heading_error), 0.0, truck.speed,
                                     curvature, believed, step, share);
+    result.articulation_rate = (state.articulation - before) / step;
     heading = cursor.headingAt(state.s);
   }
-  TruckBesideLine moved = truck;
-  moved.station = state.s;
-  moved.offset = state.offset;
-  moved.heading_error = state.heading_error;
-  moved.articulation = state.articulation;
-  return moved;
+  result.station = state.s;
+  result.offset = state.offset;
+  result.heading_error = state.heading_error;
+  result.articulation = state.articulation;
+  return result;
 }
 
 }  // namespace tunnel_pilot::learning

@@ -200,6 +200,25 @@ std::vector<float> readNumbers(const std::string& block, std::size_t count, floa
   }
 }
 
+// The map `domain` and its two blocks, which stand there or do not stand there together.
+std::optional<InputDomain> readDomain(Node& header, const std::string& mean,
+                                      const std::string& whitening, const std::string& source) {
+  if (!header.has("domain")) return std::nullopt;
+  Node node = header.child("domain");
+  InputDomain domain;
+  domain.meaning = readName(node, "meaning");
+  const std::size_t size = readSize(node, "size", InputDomain::kMaxSize);
+  domain.limit = node.number("limit", "1", 1e-3, 1e9);
+  node.finish();
+  const auto take = [&source](const std::string& block, std::size_t count, const std::string& what) {
+    const std::vector<float> read = readNumbers(block, count, kDomainLimit, what, source);
+    return std::vector<double>(read.begin(), read.end());
+  };
+  domain.mean = take(mean, size, "domain_mean number");
+  domain.whitening = take(whitening, size * (size + 1) / 2, "domain_whitening number");
+  return domain;
+}
+
 void checkGolden(const Network& network, const std::vector<float>& input,
                  const std::vector<float>& expected, const std::string& source) {
   Inference inference(network);
@@ -225,6 +244,9 @@ NetworkFile parse(std::string text, const std::string& source) {
   const std::string parameters = cutBlock(text, "parameters", source);
   const std::string golden_input = cutBlock(text, "golden_input", source);
   const std::string golden_output = cutBlock(text, "golden_output", source);
+  const bool has_domain = text.find("\ndomain: ") != std::string::npos;
+  const std::string mean = has_domain ? cutBlock(text, "domain_mean", source) : "";
+  const std::string whitening = has_domain ? cutBlock(text, "domain_whitening", source) : "";
   Node header = readHeader(text, source);
   header.choice("format", {"tunnel_pilot_network"});
   header.integer("version", "1", kVersion, kVersion);
@@ -233,8 +255,9 @@ NetworkFile parse(std::string text, const std::string& source) {
   file.inputs = readInputs(header, file.network);
   file.output = readOutput(header.child("output"), file.network);
   file.training = header.text("training");
-  header.finish();
   const PlainNumbers plain;
+  file.domain = readDomain(header, mean, whitening, source);
+  header.finish();
   std::vector<double>& own = file.network.parameters();
   const std::vector<float> read =
       readNumbers(parameters, own.size(), kParameterLimit, "parameter", source);

@@ -98,6 +98,13 @@ std::vector<float> goldenOutput(const Network& network, const std::vector<float>
   return output;
 }
 
+std::string domainText(const InputDomain& domain) {
+  return "domain: {meaning: " + quoted(domain.meaning) + ", size: " + std::to_string(domain.mean.size()) +
+         ", limit: " + shortest(domain.limit) + "}\ndomain_mean: |\n" +
+         numberLines({domain.mean.begin(), domain.mean.end()}) + "domain_whitening: |\n" +
+         numberLines({domain.whitening.begin(), domain.whitening.end()});
+}
+
 std::string fileText(const NetworkFile& file) {
   const PlainNumbers plain;
   std::string text = kFirstLine;
@@ -106,6 +113,7 @@ std::string fileText(const NetworkFile& file) {
   text += "inputs:\n";
   for (const InputGroup& group : file.inputs) text += inputText(group);
   text += "output: " + outputText(file.output) + "training: " + trainingText(file.training);
+  if (file.domain) text += domainText(*file.domain);
   const std::vector<double>& p = file.network.parameters();
   text += "parameters: |\n" + numberLines({p.begin(), p.end()});
   const std::vector<float> input = goldenInput(file.inputs);
@@ -156,8 +164,16 @@ class TemporaryFile {
   bool moved_ = false;
 };
 
+void roundToFloat(std::vector<double>& values) {
+  for (double& value : values) value = static_cast<double>(static_cast<float>(value));
+}
+
 void normalise(NetworkFile& file) {
-  for (double& p : file.network.parameters()) p = static_cast<double>(static_cast<float>(p));
+  roundToFloat(file.network.parameters());
+  if (file.domain) {
+    roundToFloat(file.domain->mean);
+    roundToFloat(file.domain->whitening);
+  }
   file.training.erase(file.training.find_last_not_of(" \n") + 1);
 }
 

@@ -17,6 +17,7 @@ constexpr char kHashKey[] = "sha256: ";
 constexpr std::size_t kHashLine = 8 + 64 + 1;
 constexpr float kParameterLimit = 1000.0F;
 constexpr float kGoldenLimit = 1e9F;
+constexpr float kDomainLimit = 1e6F;
 constexpr float kGoldenTolerance = 1e-5F;  // of outputs of magnitude 1; relative to larger ones
 constexpr std::size_t kMaxFileBytes = 64U << 20U;
 constexpr std::size_t kMaxHeaderBytes = 1U << 20U;  // all but the blocks of numbers

@@ -21,6 +21,10 @@ constexpr double kDriftWidth = 5.0;        // sizes below are for this width [m]
 constexpr double kScaleShare = 0.02;       // of each width measured, in the scale of what is drawn
 constexpr double kWallHeight = 1.5;        // of the faces drawn on the walls [m]
 constexpr double kReplayScale = 0.5;       // largest scale of the text where nobody drives
+constexpr double kFanBegin = 4.0;          // of the network's bars, before the front axle [m]
+constexpr double kBarLength = 5.0;         // of a probability of 1 [m]
+constexpr double kBarShare = 0.7;          // of the way to the next bar, wide where they begin
+constexpr double kFanLifetime = 0.5;       // [s] ROS time
 constexpr double kTextHeight = 0.85;       // of a line [m]
 constexpr double kTextLifetime = 5.0;      // a dead pilot's last words are not kept [s] ROS time
 constexpr double kStatusPeriod = 0.1;      // [s] steady time
@@ -39,6 +43,7 @@ std_msgs::ColorRGBA color(float r, float g, float b, float a) {
 const std_msgs::ColorRGBA kLeftColor = color(0.25F, 0.62F, 1.0F, 1.0F);
 const std_msgs::ColorRGBA kRightColor = color(1.0F, 0.55F, 0.15F, 1.0F);
 const std_msgs::ColorRGBA kPreviewColor = color(1.0F, 0.2F, 0.8F, 1.0F);
+const std_msgs::ColorRGBA kNetworkColor = color(0.35F, 0.95F, 0.95F, 0.9F);
 const std_msgs::ColorRGBA kPathColor = color(0.95F, 0.95F, 0.55F, 0.9F);
 
 Marker marker(const std_msgs::Header& header, const std::string& ns, int id, int type) {
@@ -164,6 +169,45 @@ std_msgs::ColorRGBA textColor(Gravity gravity) {
   return color(1.0F, 1.0F, 1.0F, 1.0F);
 }
 
+geometry_msgs::Point polar(double angle, double distance) {
+  geometry_msgs::Point p;
+  p.x = distance * std::cos(angle);
+  p.y = distance * std::sin(angle);
+  p.z = 0.4;
+  return p;
+}
+
+// The outputs, each in the direction of the articulation it stands for.
+Marker fan(const Proposal& proposal, double scale) {
+  Marker bars = marker(proposal.header, "network", 0, Marker::LINE_LIST);
+  bars.header.frame_id = kBaseFrame;
+  bars.lifetime = ros::Duration(kFanLifetime);
+  bars.color = kNetworkColor;
+  bars.scale.x = kBarShare * kFanBegin * scale * proposal.outputs_spacing;
+  for (std::size_t i = 0; i < proposal.outputs.size(); ++i) {
+    const double angle = proposal.outputs_first + static_cast<double>(i) * proposal.outputs_spacing;
+    const double probability = std::clamp(static_cast<double>(proposal.outputs[i]), 0.02, 1.0);
+    if (!std::isfinite(angle + probability)) continue;
+    bars.points.push_back(polar(angle, kFanBegin * scale));
+    bars.points.push_back(polar(angle, (kFanBegin + kBarLength * probability) * scale));
+  }
+  return bars.points.empty() || !(bars.scale.x > 0.0) ? removal(bars) : bars;
+}
+
+Marker decodedArrow(const Proposal& proposal, double scale) {
+  Marker arrow = marker(proposal.header, "network", 1, Marker::ARROW);
+  arrow.header.frame_id = kBaseFrame;
+  arrow.lifetime = ros::Duration(kFanLifetime);
+  arrow.color = kPathColor;
+  arrow.scale.x = 0.25 * scale;  // shaft, head, head's length
+  arrow.scale.y = 0.7 * scale;
+  arrow.scale.z = 0.8 * scale;
+  const double angle = proposal.articulation_angle;
+  if (!proposal.valid || !std::isfinite(angle)) return removal(arrow);
+  arrow.points = {polar(angle, kFanBegin * scale), polar(angle, (kFanBegin + 1.2 * kBarLength) * scale)};
+  return arrow;
+}
+
 // Beside the tunnel on the left, where it hides neither the truck nor its way.
 Marker statusMarker(const StatusText& status, double scale) {
   std_msgs::Header header;  // without a stamp: at the latest transform
@@ -195,6 +239,7 @@ MarkersRos::MarkersRos(ros::NodeHandle nh, ros::NodeHandle private_nh) {
   arbiter_subscriber_ = nh.subscribe("arbiter_state", 1, &MarkersRos::onArbiterState, this);
   command_subscriber_ = nh.subscribe("command", 1, &Latest<TruckCommand>::set, &command_);
   proposal_subscriber_ = nh.subscribe("preview_driver/proposal", 1, &MarkersRos::onProposal, this);
+  network_subscriber_ = nh.subscribe("lidar_driver/proposal", 1, &MarkersRos::onNetwork, this);
   status_subscriber_ = nh.subscribe("truck_status", 1, &MarkersRos::onTruckStatus, this);
   odometry_subscriber_ = nh.subscribe("odom", 1, &MarkersRos::onOdometry, this);
   timer_ = nh.createWallTimer(ros::WallDuration(kStatusPeriod),
@@ -241,6 +286,15 @@ void MarkersRos::onProposal(const Proposal& message) {
   publisher_.publish(markers);
 }
 
+void MarkersRos::onNetwork(const Proposal& message) {
+  network_.set(message);
+  if (!isSeen()) return;
+  MarkerArray markers;
+  markers.markers.push_back(fan(message, scale_));
+  markers.markers.push_back(decodedArrow(message, scale_));
+  publisher_.publish(markers);
+}
+
 void MarkersRos::onTruckStatus(const TruckStatus& message) {
   const auto before = truck_status_.get(kSilent);
   truck_status_.set(message);
@@ -276,8 +330,9 @@ void MarkersRos::publishDrivenPath() {
 void MarkersRos::publishStatus() {
   if (!isSeen()) return;
   const auto arbiter = arbiter_state_.get(kSilent);
-  const auto status = describe({truck_status_.get(kSilent), arbiter, command_.get(kSilent),
-                                tunnel_state_.get(kSilent), odometry_.get(kSilent)});
+  const auto status =
+      describe({truck_status_.get(kSilent), arbiter, command_.get(kSilent), tunnel_state_.get(kSilent),
+                odometry_.get(kSilent), network_.get(kSilent)});
   // A recording without a truck is looked at from nearer.
   const Marker text = statusMarker(status, arbiter ? scale_ : std::min(scale_, kReplayScale));
   MarkerArray markers;

@@ -61,6 +61,11 @@ void addDrive(const StatusInput& input, StatusText& out) {
   if (input.arbiter) {
     add("steered by: " + words(toString(static_cast<supervision::Source>(input.arbiter->source))), out);
   }
+  if (input.network) {
+    add(input.network->valid ? format("network: confidence %.2f", input.network->confidence)
+                             : "network: no proposal",
+        out);
+  }
   if (input.odometry) {
     std::string speed = format("%.2f m/s", rounded(input.odometry->twist.twist.linear.x));
     if (input.command && !input.command->stop)

@@ -72,17 +72,25 @@ class Drive : public ClosedLoop {
     metrics["contacts"] = ending == "contact" ? 1.0 : 0.0;
     metrics["completed"] = ending == kCompleted ? 1.0 : 0.0;
     if (ending == kCompleted) metrics["lap_time"] = time();
+    if (pilot_.lidarDriver()) metrics["lidar_driver_share"] = lidarDriverShare();
     return metrics;
   }
 
   static constexpr const char* kCompleted = "way driven";
 
+  double lidarDriverShare() const {
+    return track_.empty() ? 0.0
+                          : static_cast<double>(by_lidar_driver_) / static_cast<double>(track_.size());
+  }
+
   void takeTruth() override {
+    if (pilot_.decision().command.source == supervision::Source::kLidarDriver) ++by_lidar_driver_;
     if (observer_) observer_->afterTruth(simulator_);
   }
 
   DriveExperiment drive_;
   DriveObserver* observer_;
+  std::size_t by_lidar_driver_ = 0;  ///< truths while it steered
   std::vector<PerceptionSample> perception_;
 };
 

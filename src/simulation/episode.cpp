@@ -94,6 +94,22 @@ Setup loadSetup(const Scenario& scenario) {
   return setup;
 }
 
+void chooseDriver(const Scenario& scenario, DriverChoice driver, const std::string& network,
+                  Setup& setup) {
+  setup.pilot.driver = driver;
+  setup.fingerprints.driver = toString(driver);
+  if (driver == DriverChoice::kPreviewDriver) return;
+  if (std::holds_alternative<LaneChangeExperiment>(scenario.experiment)) {
+    throw config::ConfigError(scenario.file + ": the path of a lane change is sensed without a scan, " +
+                              "lidar_driver cannot drive it");
+  }
+  const std::string file = network.empty() ? setup.pilot.lidar_driver.network : network;
+  setup.pilot.network = std::make_shared<neural::NetworkFile>(neural::loadNetwork(file));
+  // Whether it is a lidar driver's is told before the runs.
+  drivers::LidarDriver(setup.pilot.lidar_driver, setup.truck.geometry, *setup.pilot.network);
+  setup.fingerprints.network = setup.pilot.network->sha256;
+}
+
 std::vector<EpisodePlan> episodePlans(const Scenario& scenario, int seeds) {
   std::vector<EpisodePlan> plans;
   for (int i = 0; i < seeds; ++i) {

@@ -29,6 +29,7 @@ const std::vector<MetricText>& metricTexts() {
       {"articulation_std_straights", "articulation on straights, std", "deg", kDegrees},
       {"clearance_min", "wall clearance of either body, least", "m", 1.0},
       {"contacts", "wall contacts", "", 1.0},
+      {"lidar_driver_share", "steered by lidar_driver", "%", 100.0},
       {"stops", "stops on the way", "", 1.0},
       {"completed", "way completed", "", 1.0},
       {"lap_time", "lap time", "s", 1.0},

@@ -9,6 +9,18 @@ constexpr Stamp kDecisionPeriod = std::chrono::milliseconds(20);
 
 }  // namespace
 
+std::string toString(DriverChoice driver) {
+  switch (driver) {
+    case DriverChoice::kPreviewDriver:
+      return "preview_driver";
+    case DriverChoice::kLidarDriver:
+      return "lidar_driver";
+    case DriverChoice::kAll:
+      return "all";
+  }
+  return "unknown";
+}
+
 std::vector<std::string> pilotFiles(const std::string& config_folder) {
   std::vector<std::string> files = perceptionFiles(config_folder);
   for (const char* stage : {"preview_driver", "lidar_driver", "arbiter", "can_bridge"}) {

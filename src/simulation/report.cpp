@@ -167,10 +167,12 @@ void writeSummary(const std::filesystem::path& folder, const Scenario& scenario,
   json["scenario"] = scenario.name;
   json["title"] = scenario.title;
   json["passed"] = evaluation.passed;
+  json["driver"] = fingerprints.driver;
   json["sha256"] = {{"scenario", fingerprints.scenario},
                     {"controller", fingerprints.controller},
                     {"plant", fingerprints.plant},
-                    {"world", fingerprints.world}};
+                    {"world", fingerprints.world},
+                    {"network", fingerprints.network}};
   json["units"] = "SI, radians";
   json["goals"] = ordered_json::array();
   for (const GoalResult& goal : evaluation.goals) json["goals"].push_back(goalJson(goal));

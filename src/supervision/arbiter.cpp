@@ -21,15 +21,16 @@ bool isPossible(const drivers::Proposal& proposal) {
 }  // namespace
 
 int gravity(Reason reason) {
-  constexpr std::array<Reason, 24> kRising = {
-      Reason::kNotEngaged,      Reason::kStartUp,          Reason::kOperatorRelease,
-      Reason::kLimitsHit,       Reason::kNoSource,         Reason::kSourceStale,
-      Reason::kProposalInvalid, Reason::kTunnelInvalid,    Reason::kClearance,
-      Reason::kObstacle,        Reason::kScanRejected,     Reason::kScanFrozen,
-      Reason::kScanStale,       Reason::kSpeedImplausible, Reason::kMotionStale,
-      Reason::kCommandStale,    Reason::kTrackingError,    Reason::kFeedbackCorrupt,
-      Reason::kFeedbackStale,   Reason::kBusFault,         Reason::kTruckFault,
-      Reason::kClockJump,       Reason::kOperatorOverride, Reason::kOperatorStop};
+  constexpr std::array<Reason, 26> kRising = {
+      Reason::kNotEngaged,       Reason::kStartUp,         Reason::kOperatorRelease,
+      Reason::kLimitsHit,        Reason::kDriversDisagree, Reason::kLowConfidence,
+      Reason::kNoSource,         Reason::kSourceStale,     Reason::kProposalInvalid,
+      Reason::kTunnelInvalid,    Reason::kClearance,       Reason::kObstacle,
+      Reason::kScanRejected,     Reason::kScanFrozen,      Reason::kScanStale,
+      Reason::kSpeedImplausible, Reason::kMotionStale,     Reason::kCommandStale,
+      Reason::kTrackingError,    Reason::kFeedbackCorrupt, Reason::kFeedbackStale,
+      Reason::kBusFault,         Reason::kTruckFault,      Reason::kClockJump,
+      Reason::kOperatorOverride, Reason::kOperatorStop};
   const auto place = std::find(kRising.begin(), kRising.end(), reason);
   return place == kRising.end() ? 0 : static_cast<int>(place - kRising.begin()) + 1;
 }
@@ -121,6 +122,7 @@ void Arbiter::clockJumped() {
   free_ways_.clear();
   slow_until_.reset();
   wait_until_.reset();
+  disagree_since_.reset();
   last_hit_.reset();
   last_.reset();
   hits_ = 0;
@@ -139,7 +141,9 @@ Arbiter::Health Arbiter::health(const SourceRule& rule, Stamp now) const {
     return Health::kStale;
   }
   if (!isPossible(slot.proposal) || stamp_age < -parameters_.max_future) return Health::kInvalid;
-  return slot.proposal.valid ? Health::kHealthy : Health::kUnable;
+  if (!slot.proposal.valid) return Health::kUnable;
+  // Written so that a confidence that is no number is none.
+  return slot.proposal.confidence >= rule.min_confidence ? Health::kHealthy : Health::kUnsure;
 }
 
 const SourceRule* Arbiter::bestSource(Stamp now) const {
@@ -149,6 +153,28 @@ const SourceRule* Arbiter::bestSource(Stamp now) const {
     if (health(rule, now) == Health::kHealthy) best = &rule;
   }
   return best;
+}
+
+const drivers::Proposal* Arbiter::healthyProposal(Source source, Stamp now) const {
+  for (const SourceRule& rule : parameters_.sources) {
+    if (rule.source != source || health(rule, now) != Health::kHealthy) continue;
+    return &slots_[static_cast<std::size_t>(source)].proposal;
+  }
+  return nullptr;
+}
+
+// The network against the analytic driver: while both have an answer, they must be much the same.
+void Arbiter::compareDrivers(Stamp now) {
+  const drivers::Proposal* lidar = healthyProposal(Source::kLidarDriver, now);
+  const drivers::Proposal* preview = healthyProposal(Source::kPreviewDriver, now);
+  const bool disagree =
+      lidar && preview &&
+      std::abs(lidar->articulation_angle - preview->articulation_angle) > parameters_.disagreement_angle;
+  if (!disagree) {
+    disagree_since_.reset();
+  } else if (!disagree_since_) {
+    disagree_since_ = now;
+  }
 }
 
 void Arbiter::assessScan(Stamp now, Findings& findings) const {
@@ -229,11 +255,26 @@ void Arbiter::assessSources(Stamp now, Findings& findings) const {
         causes.stopFor(Reason::kNoSource);
         excused = excused || tunnel_lost;
         break;
+      case Health::kUnsure:
+        causes.stopFor(Reason::kLowConfidence);
+        break;
       case Health::kHealthy:
         break;
     }
   }
   if (!excused) findings.stopFor(causes.stop);
+}
+
+// A source that would steer, were it sure, sees something that others may not see as well: slowly.
+void Arbiter::assessConfidence(Stamp now, Findings& findings) const {
+  const SourceRule* best = bestSource(now);
+  for (const SourceRule& rule : parameters_.sources) {
+    const bool before_best = rule.steers && (!best || rule.priority > best->priority);
+    if (before_best && health(rule, now) == Health::kUnsure) findings.slowFor(Reason::kLowConfidence);
+  }
+  if (disagree_since_ && age(disagree_since_, now) >= parameters_.disagreement_time) {
+    findings.slowFor(Reason::kDriversDisagree);
+  }
 }
 
 Arbiter::Findings Arbiter::assess(Stamp now) const {
@@ -243,6 +284,7 @@ Arbiter::Findings Arbiter::assess(Stamp now) const {
   assessMotion(now, findings);
   assessTruck(now, findings);
   assessSources(now, findings);
+  assessConfidence(now, findings);
   if (obstructed_scans_ >= parameters_.obstacle_scans) findings.stopFor(obstruction_);
   if (hits_ >= parameters_.limit_hits) findings.slowFor(Reason::kLimitsHit);
   return findings;
@@ -417,6 +459,7 @@ const Decision& Arbiter::decide(Stamp now) {
   watchClock(now);
   const Steering steering = chooseSteering(now);
   updateCorridor(steering.articulation, now);
+  compareDrivers(now);
   Findings findings = assess(now);
   latch(findings, now);
   Speed speed = waitForFreeWay(chooseSpeed(now), now);

@@ -25,6 +25,7 @@ SourceRule loadRule(config::Node node) {
   rule.source = sourcesByName().at(node.choice("source", names));
   rule.priority = static_cast<int>(node.integer("priority", "1", 0, 255));
   rule.max_age = node.number("max_age", "s", 0.02, 1.0);
+  rule.min_confidence = node.number("min_confidence", "1", 0.0, 1.0);
   rule.steers = node.boolean("steers");
   rule.gives_speed = node.boolean("gives_speed");
   node.finish();
@@ -72,6 +73,10 @@ ArbiterParameters loadArbiter(config::Node node) {
   p.tracking_tolerance = tracking.number("tolerance", "rad", 0.01, 1.0);
   p.tracking_time = tracking.number("time", "s", 0.05, 5.0);
   tracking.finish();
+  config::Node disagreement = node.child("disagreement");
+  p.disagreement_angle = disagreement.number("angle", "rad", 0.01, 1.0);
+  p.disagreement_time = disagreement.number("time", "s", 0.0, 5.0);
+  disagreement.finish();
   p.obstacle_scans = static_cast<int>(node.integer("obstacle_scans", "1", 1, 10));
   p.governor = loadSpeedGovernor(node.child("governor"));
   p.envelope = loadEnvelope(node.child("envelope"));

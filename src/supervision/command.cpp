@@ -54,6 +54,8 @@ std::string toString(Reason reason) {
     case Reason::kStartUp: return "starting up";
     case Reason::kScanFrozen: return "the lidar repeats the same scan";
     case Reason::kSpeedImplausible: return "implausible speed";
+    case Reason::kLowConfidence: return "low confidence of the driver";
+    case Reason::kDriversDisagree: return "the drivers disagree";
   }
   return "unknown reason";
 }

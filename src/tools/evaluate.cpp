@@ -27,9 +27,20 @@ struct Arguments {
   std::vector<std::string> scenarios;
   std::string out;
   std::string config;
+  std::string driver;
+  std::string network;
   int seeds = 0;
   int jobs = 1;
 };
+
+simulation::DriverChoice driverOf(const Arguments& arguments) {
+  using simulation::DriverChoice;
+  for (const DriverChoice choice :
+       {DriverChoice::kPreviewDriver, DriverChoice::kLidarDriver, DriverChoice::kAll}) {
+    if (toString(choice) == arguments.driver) return choice;
+  }
+  throw options::error("--driver must be preview_driver, lidar_driver or all");
+}
 
 // False when only help was asked for. Throws options::error.
 bool parse(int argc, char** argv, Arguments& arguments) {
@@ -44,6 +55,10 @@ bool parse(int argc, char** argv, Arguments& arguments) {
       "writes summary.json, CSV files and plots to DIR/<scenario>; without it only the table is "
       "printed")("config", options::value(&arguments.config)->value_name("DIR"),
                  "parameter files instead of the scenario's")(
+      "driver", options::value(&arguments.driver)->default_value("preview_driver")->value_name("NAME"),
+      "who proposes: preview_driver, lidar_driver, or all (lidar_driver steers while it is sure)")(
+      "network", options::value(&arguments.network)->value_name("FILE"),
+      "lidar_driver's network instead of the one that config/lidar_driver.yaml names")(
       "jobs", options::value(&arguments.jobs)->default_value(1)->value_name("N"), "threads");
   options::positional_options_description positional;
   positional.add("scenario", -1);
@@ -59,6 +74,10 @@ bool parse(int argc, char** argv, Arguments& arguments) {
     throw options::error("--seeds must be 1 to 100000");
   }
   if (arguments.jobs < 1 || arguments.jobs > 256) throw options::error("--jobs must be 1 to 256");
+  const simulation::DriverChoice driver = driverOf(arguments);
+  if (driver == simulation::DriverChoice::kPreviewDriver && !arguments.network.empty()) {
+    throw options::error("--network is of no use without --driver lidar_driver or all");
+  }
   return true;
 }
 
@@ -102,15 +121,33 @@ std::string endings(const std::vector<simulation::EpisodeResult>& episodes) {
   return text;
 }
 
+// Which network drove, and how long.
+std::string networkLine(const neural::NetworkFile& network,
+                        const std::vector<simulation::EpisodeResult>& episodes) {
+  double share = 0.0;
+  int drives = 0;
+  for (const simulation::EpisodeResult& episode : episodes) {
+    const auto found = episode.metrics.find("lidar_driver_share");
+    if (found == episode.metrics.end()) continue;
+    share += found->second;
+    ++drives;
+  }
+  char text[64];
+  std::snprintf(text, sizeof text, " steered %.1f %% of the time.", 100.0 * share / std::max(drives, 1));
+  return "Network " + network.name + " " + network.sha256.substr(0, 12) + text;
+}
+
 // True when every goal of the scenario holds.
 bool evaluate(const std::string& file, const Arguments& arguments) {
   simulation::Scenario scenario = simulation::loadScenario(file);
   if (!arguments.config.empty()) scenario.config_folder = arguments.config;
   const int seeds = arguments.seeds > 0 ? arguments.seeds : scenario.seeds;
-  const simulation::Setup setup = simulation::loadSetup(scenario);
+  simulation::Setup setup = simulation::loadSetup(scenario);
+  simulation::chooseDriver(scenario, driverOf(arguments), arguments.network, setup);
   const auto plans = simulation::episodePlans(scenario, seeds);
   const std::string folder = arguments.out.empty() ? "" : arguments.out + "/" + scenario.name;
-  if (!folder.empty()) simulation::makeReportFolder(folder);  // one that cannot be is told before the runs
+  if (!folder.empty())
+    simulation::makeReportFolder(folder);  // one that cannot be is told before the runs
 
   ProgressLine progress(scenario.name, plans.size());
   const auto start = std::chrono::steady_clock::now();
@@ -123,6 +160,7 @@ bool evaluate(const std::string& file, const Arguments& arguments) {
   std::printf("%zu episodes, %.0f times real time: %s. %s\n\n", episodes.size(),
               simulatedTime(episodes) / std::max(elapsed, 1e-9), endings(episodes).c_str(),
               evaluation.passed ? "Every goal holds." : "A goal is MISSED.");
+  if (setup.pilot.network) std::printf("%s\n\n", networkLine(*setup.pilot.network, episodes).c_str());
   std::fflush(stdout);
   if (!folder.empty()) {
     simulation::writeReport(folder, scenario, evaluation, episodes, setup.fingerprints,

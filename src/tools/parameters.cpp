@@ -12,6 +12,7 @@
 
 #include "tunnel_pilot/bridge/bridge_parameters.h"
 #include "tunnel_pilot/config/node.h"
+#include "tunnel_pilot/drivers/lidar_driver.h"
 #include "tunnel_pilot/drivers/preview_parameters.h"
 #include "tunnel_pilot/perception/centerline.h"
 #include "tunnel_pilot/perception/scan_filter.h"
@@ -30,7 +31,8 @@ const std::vector<std::pair<std::string, std::function<void(const config::Node&)
     {"scan_filter", [](const config::Node& node) { perception::loadScanFilter(node); }},
     {"wall_segmentation", [](const config::Node& node) { perception::loadWallSegmentation(node); }},
     {"centerline", [](const config::Node& node) { perception::loadCenterline(node); }},
-    {"preview_driver", [](const config::Node& node) { drivers::loadPreviewDriver(node, "."); }},
+    {"lidar_driver", [](const config::Node& node) { drivers::loadLidarDriver(node, ""); }},
+    {"preview_driver", [](const config::Node& node) { drivers::loadPreviewDriver(node, ""); }},
     {"arbiter", [](const config::Node& node) { supervision::loadArbiter(node); }},
     {"can_bridge", [](const config::Node& node) { bridge::loadBridge(node); }},
     {"simulator", [](const config::Node& node) { simulation::loadSimulator(node); }},

@@ -32,18 +32,21 @@ GaussianCode::Decoded decoded(const std::vector<double>& outputs) {
   return kCode.decode(outputs.data());
 }
 
-double centroid(const std::vector<double>& p) {
-  double weighted = 0.0;
-  double total = 0.0;
-  for (std::size_t i = 0; i < p.size(); ++i) {
-    weighted += p[i] * kCode.node(i);
-    total += p[i];
-  }
-  return weighted / total;
-}
-
 double argMax(const std::vector<double>& p) {
   return kCode.node(static_cast<std::size_t>(std::max_element(p.begin(), p.end()) - p.begin()));
+}
+
+// Centre of gravity of the outputs around the highest, `reach` nodes to either side.
+double centroid(const std::vector<double>& p, std::ptrdiff_t reach) {
+  const std::ptrdiff_t top = std::max_element(p.begin(), p.end()) - p.begin();
+  double weighted = 0.0;
+  double total = 0.0;
+  for (std::ptrdiff_t i = 0; i < static_cast<std::ptrdiff_t>(p.size()); ++i) {
+    if (std::abs(i - top) > reach) continue;
+    weighted += p[static_cast<std::size_t>(i)] * kCode.node(static_cast<std::size_t>(i));
+    total += p[static_cast<std::size_t>(i)];
+  }
+  return weighted / total;
 }
 
 // RMS error of a way to decode over values within +-40 degrees, with noise on the outputs.
@@ -87,11 +90,14 @@ TEST(GaussianCode, DecodesCleanOutputsWithinThreeHundredthsOfADegree) {
   EXPECT_LE(rmsError(0.0, byFit), 1e-9);
 }
 
-TEST(GaussianCode, DecodesNoisyOutputsThreeTimesBetterThanCentroidAndArgMax) {
+TEST(GaussianCode, DecodesNoisyOutputsBetterThanAnyCentroidAndAFifthOfArgMaxsError) {
   const double fit = rmsError(0.05, byFit);
   EXPECT_NEAR(fit, 0.21, 0.015);
-  EXPECT_LE(fit, rmsError(0.05, argMax) / 3.0);
-  EXPECT_LE(fit, rmsError(0.05, centroid) / 3.0);
+  EXPECT_NEAR(rmsError(0.05, argMax), 1.03, 0.03);
+  EXPECT_LE(5.0 * fit, rmsError(0.05, argMax));
+  for (std::ptrdiff_t reach = 1; reach <= 30; ++reach) {
+    EXPECT_LE(fit, 0.8 * rmsError(0.05, [&](const auto& p) { return centroid(p, reach); })) << reach;
+  }
 }
 
 TEST(GaussianCode, DecodesUpToTheEndsOfTheGrid) {

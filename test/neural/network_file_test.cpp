@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include <chrono>
 #include <clocale>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -156,11 +156,11 @@ TEST(NetworkFile, SixtyThousandParametersLoadInLessThanHalfASecond) {
   network.network = large;
   network.inputs = {{"ranges", "m", 1900, InputGroup::Transform::kLinear, 0.0, 40.0, 0.0, 40.0}};
   saveNetwork(folder.file("a.yaml"), network);
-  const auto start = std::chrono::steady_clock::now();
+  const std::clock_t start = std::clock();  // processor time: other programs do not count
   loadNetwork(folder.file("a.yaml"));
-  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
-  RecordProperty("load_ms", static_cast<int>(1e3 * taken.count()));
-  EXPECT_LT(taken.count(), 0.5);
+  const double taken = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+  RecordProperty("load_ms", static_cast<int>(1e3 * taken));
+  EXPECT_LT(taken, 0.5);
 }
 
 TEST(InputGroup, ScalesAfterItClamps) {
@@ -172,6 +172,25 @@ TEST(InputGroup, ScalesAfterItClamps) {
   EXPECT_DOUBLE_EQ(inverse.scaled(8.0), 0.25);
   EXPECT_DOUBLE_EQ(inverse.scaled(0.0), 4.0);
   EXPECT_DOUBLE_EQ(inverse.scaled(1e9), 0.05);
+}
+
+NetworkFile networkWithDomain() {
+  NetworkFile network = smallNetwork();
+  network.domain = InputDomain{"sectors", 7.5, {0.5, -1.25}, {2.0, 0.1, 3.0}};
+  return network;
+}
+
+TEST(NetworkFile, TheDomainOfItsInputsComesBackInFloats) {
+  const NetworkFile loaded = parseNetwork(textOf(networkWithDomain()), "file");
+  ASSERT_TRUE(loaded.domain);
+  EXPECT_EQ(loaded.domain->meaning, "sectors");
+  EXPECT_EQ(loaded.domain->limit, 7.5);
+  EXPECT_EQ(loaded.domain->mean, (std::vector<double>{0.5, -1.25}));
+  EXPECT_EQ(loaded.domain->whitening, (std::vector<double>{2.0, static_cast<double>(0.1F), 3.0}));
+}
+
+TEST(NetworkFile, WithoutADomainThereIsNone) {
+  EXPECT_FALSE(parseNetwork(textOf(smallNetwork()), "file").domain);
 }
 
 // --- bad files
@@ -299,6 +318,29 @@ TEST_F(BadNetworkFile, EveryWrongContentIsRefusedWithItsReason) {
     const bool yaml = std::string(bad.message).find("YAML: ") != std::string::npos;
     EXPECT_EQ(yaml ? message.substr(0, std::string(bad.message).size()) : message, bad.message)
         << bad.replace << " -> " << bad.by;
+  }
+}
+
+TEST_F(BadNetworkFile, AWrongDomainIsRefusedWithItsReason) {
+  const BadFile bad_domains[] = {
+      {"domain: {meaning: \"sectors\", size: 2, limit: 7.5}\n", "", "file: 'domain_mean' is unknown"},
+      {"domain_mean: |\n  0.5 -1.25\n", "",
+       "file: 'domain_mean' is missing, or is no block of numbers"},
+      {"size: 2", "size: 3", "file: domain_mean numbers: only 2 of 3"},
+      {"size: 2", "size: 1", "file: domain_mean numbers: more than the 1 that belong here"},
+      {"size: 2", "size: 257", "file: 'domain.size' = 257 must be a whole number [1] in [1, 256]"},
+      {"limit: 7.5", "limit: 0", "file: 'domain.limit' = 0 must be a number [1] in [0.001, 1e+09]"},
+      {"limit: 7.5", "limit: 7.5, factor: 2", "file: 'domain.factor' is unknown"},
+      {"  2 0.1 3\n", "  2 0.1\n", "file: domain_whitening numbers: only 2 of 3"},
+      {"  2 0.1 3\n", "  2 0.1 nan\n", "file: domain_whitening number 3 'nan' is not finite"},
+  };
+  const std::string good = textOf(networkWithDomain());
+  for (const BadFile& bad : bad_domains) {
+    std::string text = good;
+    const std::size_t at = text.find(bad.replace);
+    ASSERT_NE(at, std::string::npos) << bad.replace;
+    text.replace(at, std::string(bad.replace).size(), bad.by);
+    EXPECT_EQ(refusal(resigned(text)), bad.message);
   }
 }
 

@@ -2,8 +2,10 @@
 // figures are those of the same lap without ROS.
 #include <gtest/gtest.h>
 #include <ros/ros.h>
+#include <tunnel_pilot/TruckCommand.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <string>
@@ -22,10 +24,11 @@ void expectAlike(double with_ros, double without, const char* what) {
 
 // What `evaluate` tells: each figure's median over five seeds. The timing of processes makes the lap
 // with ROS a draw of its own, so a single seed's largest offset is no measure for it.
-simulation::Metrics medianLapWithoutRos() {
+simulation::Metrics medianLapWithoutRos(simulation::DriverChoice driver) {
   const auto scenario =
       simulation::loadScenario(std::string(TUNNEL_PILOT_SOURCE_DIR) + "/scenarios/default_drift.yaml");
-  const auto setup = simulation::loadSetup(scenario);
+  auto setup = simulation::loadSetup(scenario);
+  simulation::chooseDriver(scenario, driver, "", setup);
   std::map<std::string, std::vector<double>> figures;
   for (const auto& plan : simulation::episodePlans(scenario, 5)) {
     for (const auto& [figure, value] : simulation::runEpisode(scenario, setup, plan).metrics) {
@@ -37,7 +40,29 @@ simulation::Metrics medianLapWithoutRos() {
   return medians;
 }
 
+// Commands while the pilot drives, by who steered.
+class SteeringCount {
+ public:
+  explicit SteeringCount(ros::NodeHandle nh)
+      : subscriber_(nh.subscribe("command", 100, &SteeringCount::onCommand, this)) {}
+
+  double share(std::uint8_t source) const { return 1.0 * counts_.at(source) / total_; }
+
+ private:
+  void onCommand(const TruckCommand& command) {
+    if (command.mode != TruckCommand::MODE_AUTONOMOUS) return;
+    ++counts_.at(command.source);
+    ++total_;
+  }
+
+  ros::Subscriber subscriber_;
+  std::array<int, 16> counts_{};
+  int total_ = 0;
+};
+
 TEST(ClosedLoop, DrivesOneLapAsWellAsWithoutRos) {
+  const bool by_network = ros::param::param<bool>("~by_network", false);
+  const SteeringCount steering{ros::NodeHandle()};
   LapMonitor monitor{ros::NodeHandle(), ros::NodeHandle("~lap_monitor")};
   while (ros::ok() && !monitor.passed()) {
     ros::spinOnce();
@@ -46,8 +71,12 @@ TEST(ClosedLoop, DrivesOneLapAsWellAsWithoutRos) {
   ASSERT_TRUE(monitor.passed().has_value());
   EXPECT_TRUE(*monitor.passed());
   const auto with_ros = monitor.metrics();
-  const auto without = medianLapWithoutRos();
+  const auto without = medianLapWithoutRos(by_network ? simulation::DriverChoice::kAll
+                                                      : simulation::DriverChoice::kPreviewDriver);
   ASSERT_EQ(1.0, without.at("completed"));
+  EXPECT_GT(steering.share(by_network ? TruckCommand::SOURCE_LIDAR_DRIVER
+                                      : TruckCommand::SOURCE_PREVIEW_DRIVER),
+            0.9);
   for (const char* figure : {"lateral_mean", "lateral_rms", "lateral_max", "clearance_min"}) {
     expectAlike(with_ros.at(figure), without.at(figure), figure);
   }

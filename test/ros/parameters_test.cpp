@@ -9,6 +9,8 @@
 #include <cstdlib>
 #include <memory>
 
+#include "../drivers/random_network.h"
+#include "../neural/small_network.h"
 #include "tunnel_pilot/perception/centerline.h"
 #include "tunnel_pilot/perception/scan_filter.h"
 #include "tunnel_pilot/perception/wall_segmentation.h"
@@ -16,6 +18,7 @@
 #include "tunnel_pilot/ros/can_bridge_ros.h"
 #include "tunnel_pilot/ros/centerline_ros.h"
 #include "tunnel_pilot/ros/lap_monitor.h"
+#include "tunnel_pilot/ros/lidar_driver_ros.h"
 #include "tunnel_pilot/ros/markers_ros.h"
 #include "tunnel_pilot/ros/preview_driver_ros.h"
 #include "tunnel_pilot/ros/scan_filter_ros.h"
@@ -38,10 +41,11 @@ struct StageCase {
 };
 
 const StageCase kStages[] = {
-    {"scan_filter", start<ScanFilterRos>}, {"wall_segmentation", start<WallSegmentationRos>},
-    {"centerline", start<CenterlineRos>},  {"preview_driver", start<PreviewDriverRos>},
-    {"arbiter", start<ArbiterRos>},        {"can_bridge", start<CanBridgeRos>},
-    {"simulator", start<SimulatorRos>},    {"lap_monitor", start<LapMonitor>},
+    {"scan_filter", start<ScanFilterRos>},   {"wall_segmentation", start<WallSegmentationRos>},
+    {"centerline", start<CenterlineRos>},    {"preview_driver", start<PreviewDriverRos>},
+    {"lidar_driver", start<LidarDriverRos>}, {"arbiter", start<ArbiterRos>},
+    {"can_bridge", start<CanBridgeRos>},     {"simulator", start<SimulatorRos>},
+    {"lap_monitor", start<LapMonitor>},
 };
 
 // The way to one value in a tree: keys and indices.
@@ -184,6 +188,25 @@ TEST(BadParameters, NodeletIsNotLoaded) {
   EXPECT_FALSE(loader.load("/without_parameters", "tunnel_pilot/scan_filter", {}, {}));
 }
 
+TEST(BadParameters, ANetworkByARelativePathOrABadOneIsRefused) {
+  const ros::NodeHandle private_nh("spoilt_lidar_driver");
+  XmlRpcValue tree;
+  ros::NodeHandle().getParam("lidar_driver", tree);
+  for (const auto& [file, told] :
+       {std::pair("../networks/lidar_driver.yaml", "must be the absolute path"),
+        std::pair("/nowhere/network.yaml", "does not exist"),
+        std::pair(TUNNEL_PILOT_SOURCE_DIR "/config/truck.yaml", "is not a network file")}) {
+    tree["network"] = file;
+    private_nh.setParam(private_nh.getNamespace(), tree);
+    try {
+      start<LidarDriverRos>(private_nh);
+      ADD_FAILURE() << file << " was accepted";
+    } catch (const config::ConfigError& error) {
+      EXPECT_NE(std::string::npos, std::string(error.what()).find(told)) << error.what();
+    }
+  }
+}
+
 TEST(BadParameters, MarkersTakeNone) {
   ros::NodeHandle("spoilt_markers").setParam("size", 1);
   EXPECT_THROW(start<MarkersRos>(ros::NodeHandle("spoilt_markers")), config::ConfigError);
@@ -201,7 +224,7 @@ TEST_P(NodeTest, WithoutParametersEndsWithAnErrorStatus) {
 
 INSTANTIATE_TEST_SUITE_P(Nodes, NodeTest,
                          ::testing::Values("arbiter", "can_bridge", "centerline", "lap_monitor",
-                                           "preview_driver", "scan_filter", "simulator",
+                                           "lidar_driver", "preview_driver", "scan_filter", "simulator",
                                            "wall_segmentation"));
 
 }  // namespace
@@ -210,6 +233,10 @@ INSTANTIATE_TEST_SUITE_P(Nodes, NodeTest,
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);
   ros::init(argc, argv, "parameters_test");
-  ros::NodeHandle keep_alive;
+  const ros::NodeHandle nh;
+  const tunnel_pilot::neural::Folder folder;
+  auto network = tunnel_pilot::drivers::randomNetwork();
+  tunnel_pilot::neural::saveNetwork(folder.file("network.yaml"), network);
+  nh.setParam("lidar_driver/network", folder.file("network.yaml"));
   return RUN_ALL_TESTS();
 }

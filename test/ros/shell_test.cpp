@@ -335,6 +335,17 @@ TEST(StatusText, TellsHowTheTruckDrives) {
   }
 }
 
+TEST(StatusText, TellsHowSureTheNetworkIs) {
+  auto input = drivingStatus();
+  EXPECT_FALSE(tells(describe(input), "network"));
+  input.network.emplace();
+  input.network->valid = true;
+  input.network->confidence = 0.87;
+  EXPECT_TRUE(tells(describe(input), "network: confidence 0.87"));
+  input.network->valid = false;
+  EXPECT_TRUE(tells(describe(input), "network: no proposal"));
+}
+
 TEST(StatusText, TellsWhyTheBridgeStoppedTheTruck) {
   auto input = drivingStatus();
   input.truck->state = TruckStatus::STATE_STOPPED;

@@ -3,12 +3,15 @@
 #include <sensor_msgs/PointCloud2.h>
 #include <tf2_ros/static_transform_broadcaster.h>
 #include <tunnel_pilot/ArbiterState.h>
+#include <tunnel_pilot/LoadNetwork.h>
 #include <tunnel_pilot/Proposal.h>
 #include <tunnel_pilot/TruckCommand.h>
 #include <tunnel_pilot/TruckStatus.h>
 #include <tunnel_pilot/TunnelState.h>
 #include <tunnel_pilot/Walls.h>
 
+#include "../drivers/random_network.h"
+#include "../neural/small_network.h"
 #include "stage_test.h"
 #include "tunnel_pilot/ros/conversions.h"
 
@@ -388,6 +391,130 @@ TEST_F(PreviewDriverTest, DoesNotPairAStateWithAnotherScansCenterline) {
   send(path_, pathAt(999.97));
   send(state_, stateAt(1000.0, true));
   EXPECT_FALSE(spinUntil([&] { return !proposals_.messages.empty(); }, 0.3));
+}
+
+class LidarDriverTest : public StageTest {
+ protected:
+  LidarDriverTest()
+      : scan_(nh_.advertise<sensor_msgs::LaserScan>("scan_filtered", 10)),
+        odometry_(nh_.advertise<nav_msgs::Odometry>("odom", 10)),
+        joints_(nh_.advertise<sensor_msgs::JointState>("joint_states", 10)),
+        status_(nh_.advertise<TruckStatus>("truck_status", 10)),
+        proposals_(nh_, "lidar_driver/proposal"),
+        network_(save("network.yaml", 1)) {
+    nh_.setParam("lidar_driver/network", folder_.file("network.yaml"));
+    EXPECT_TRUE(load("lidar_driver", "lidar_driver"));
+    EXPECT_TRUE(spinUntil([&] {
+      return scan_.getNumSubscribers() > 0 && odometry_.getNumSubscribers() > 0 &&
+             joints_.getNumSubscribers() > 0 && status_.getNumSubscribers() > 0 &&
+             proposals_.connected();
+    }));
+  }
+
+  neural::NetworkFile save(const std::string& name, std::uint64_t seed) {
+    neural::NetworkFile network = drivers::randomNetwork(seed);
+    neural::saveNetwork(folder_.file(name), network);
+    return network;
+  }
+  void tellMotion(double stamp) {
+    send(joints_, jointStateAt(stamp, 0.0));
+    send(odometry_, odometryAt(stamp, 2.0));
+  }
+  Proposal answerTo(const sensor_msgs::LaserScan& scan) {
+    send(scan_, scan);
+    EXPECT_TRUE(spinUntil([&] { return proposals_.has(scan.header.stamp); }));
+    return proposals_.messages.empty() ? Proposal() : proposals_.messages.back();
+  }
+  Proposal proposalAt(double stamp) {
+    setTime(stamp + 0.04);
+    tellMotion(stamp + 0.03);
+    return answerTo(tunnelScan(stamp));
+  }
+  void tellState(std::uint8_t state) {
+    TruckStatus status;
+    status.header.stamp = ros::Time::now();
+    status.state = state;
+    send(status_, status);
+  }
+  LoadNetwork::Response loadNetwork(const std::string& file) {
+    LoadNetwork call;
+    call.request.file = file;
+    EXPECT_TRUE(ros::service::call("lidar_driver/load_network", call));
+    return call.response;
+  }
+
+  neural::Folder folder_;
+  ros::Publisher scan_, odometry_, joints_, status_;
+  Listener<Proposal> proposals_;
+  neural::NetworkFile network_;
+};
+
+TEST_F(LidarDriverTest, ProposesWithTheScansStampItsOutputsAndTheNetworksName) {
+  const auto proposal = proposalAt(1000.0);
+  EXPECT_TRUE(proposal.valid);
+  EXPECT_EQ(31u, proposal.outputs.size());
+  EXPECT_EQ("random " + network_.sha256, proposal.model);
+  EXPECT_DOUBLE_EQ(network_.output.first, proposal.outputs_first);
+  EXPECT_NEAR(network_.output.spacing, proposal.outputs_spacing, 1e-12);
+  EXPECT_TRUE(diagnosticsSay("lidar_driver", "proposing"));
+}
+
+TEST_F(LidarDriverTest, ProposesNothingValidFromAScanWithoutReturnsAndSaysSo) {
+  setTime(1000.04);
+  tellMotion(1000.03);
+  auto scan = tunnelScan(1000.0);
+  fill(scan, kNan);
+  EXPECT_FALSE(answerTo(scan).valid);
+  EXPECT_TRUE(diagnosticsSay("lidar_driver", "no return"));
+}
+
+TEST_F(LidarDriverTest, SaysThatItLacksTheTrucksMotion) {
+  setTime(1000.04);
+  send(scan_, tunnelScan(1000.0));
+  EXPECT_TRUE(diagnosticsSay("lidar_driver", "no odometry"));
+  EXPECT_TRUE(proposals_.messages.empty());
+}
+
+TEST_F(LidarDriverTest, DrivesOnAfterTheClockJumpedBack) {
+  ASSERT_TRUE(proposalAt(1000.0).valid);
+  setTime(900.0);
+  tellMotion(900.03);
+  setTime(900.04);
+  send(scan_, tunnelScan(900.0));
+  EXPECT_TRUE(diagnosticsSay("lidar_driver", "no odometry")) << "motion is forgotten";
+  EXPECT_TRUE(proposalAt(900.1).valid);
+}
+
+TEST_F(LidarDriverTest, TakesAnotherNetworkInStandby) {
+  const neural::NetworkFile other = save("other.yaml", 2);
+  ASSERT_NE(network_.sha256, other.sha256);
+  tellState(TruckStatus::STATE_STANDBY);
+  const auto response = loadNetwork(folder_.file("other.yaml"));
+  EXPECT_TRUE(response.success);
+  EXPECT_EQ("random " + other.sha256, response.message);
+  EXPECT_EQ("random " + other.sha256, proposalAt(1000.0).model);
+}
+
+TEST_F(LidarDriverTest, KeepsItsNetworkWhileTheTruckIsNotInStandbyOrTheFileIsBad) {
+  save("other.yaml", 2);
+  for (const auto& [state, file, told] :
+       {std::tuple(TruckStatus::STATE_ACTIVE, folder_.file("other.yaml"), "ACTIVE"),
+        std::tuple(TruckStatus::STATE_DEGRADED, folder_.file("other.yaml"), "DEGRADED"),
+        std::tuple(TruckStatus::STATE_STOPPED, folder_.file("other.yaml"), "STOPPED"),
+        std::tuple(TruckStatus::STATE_STANDBY, folder_.file("none.yaml"), "does not exist"),
+        std::tuple(TruckStatus::STATE_STANDBY, std::string("other.yaml"), "absolute path")}) {
+    tellState(state);
+    const auto response = loadNetwork(file);
+    EXPECT_FALSE(response.success) << told;
+    EXPECT_NE(std::string::npos, response.message.find(told)) << response.message;
+  }
+  EXPECT_EQ("random " + network_.sha256, proposalAt(1000.0).model);
+}
+
+TEST_F(LidarDriverTest, ATruckThatTellsNoStateMustStand) {
+  save("other.yaml", 2);
+  tellMotion(1000.0);  // at 2 m/s
+  EXPECT_FALSE(loadNetwork(folder_.file("other.yaml")).success);
 }
 
 class ArbiterTest : public StageTest {

@@ -24,6 +24,7 @@ struct ArbiterBench {
     p.valid = true;
     p.articulation_angle = articulation;
     p.speed = asked_speed;
+    p.confidence = 1.0;
     return p;
   }
 

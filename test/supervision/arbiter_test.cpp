@@ -148,6 +148,113 @@ TEST(Arbiter, AProposalFromTheFutureIsNotFollowed) {
   EXPECT_EQ(bench.arbiter->decide(bench.now).command.source, Source::kPreviewDriver);
 }
 
+// ---- a driver that is unsure, drivers that disagree (RELIABILITY N3)
+
+drivers::Proposal lidarProposal(const ArbiterBench& bench, double confidence,
+                                double articulation = 0.01) {
+  drivers::Proposal proposal = bench.proposal(articulation);
+  proposal.confidence = confidence;
+  return proposal;
+}
+
+const Decision& cyclesWith(ArbiterBench& bench, int count, double confidence,
+                           double articulation = 0.01) {
+  const Decision* decision = nullptr;
+  for (int i = 0; i < count; ++i) {
+    bench.arbiter->setProposal(Source::kLidarDriver, lidarProposal(bench, confidence, articulation),
+                               bench.now);
+    decision = &bench.cycle();
+  }
+  return *decision;
+}
+
+double lidarsLeast(const ArbiterBench& bench) {
+  for (const SourceRule& rule : bench.parameters.sources) {
+    if (rule.source == Source::kLidarDriver) return rule.min_confidence;
+  }
+  return 0.0;
+}
+
+TEST(Arbiter, AnUnsureSourceIsDroppedForTheNextWhichDrivesSlowly) {
+  ArbiterBench bench;
+  bench.drive();
+  const double least = lidarsLeast(bench);
+  ASSERT_GT(least, 0.0);
+  EXPECT_EQ(cyclesWith(bench, 1, least).command.source, Source::kLidarDriver);
+  EXPECT_FALSE(bench.arbiter->decide(bench.now).degraded);
+  for (const double unsure : {least - 1e-6, 0.0, kNaN}) {
+    const Decision& decision = cyclesWith(bench, 1, unsure);
+    EXPECT_EQ(decision.command.source, Source::kPreviewDriver);
+    EXPECT_TRUE(decision.degraded);
+    EXPECT_FALSE(decision.command.stop);
+    EXPECT_EQ(decision.command.reason, Reason::kLowConfidence);
+  }
+}
+
+TEST(Arbiter, ASourceThatIsSureAgainSteersAtOnceAndDrivesFastAfterASecond) {
+  ArbiterBench bench;
+  bench.drive();
+  cyclesWith(bench, 5, 0.0);
+  const Decision& at_once = cyclesWith(bench, 1, 1.0);
+  EXPECT_EQ(at_once.command.source, Source::kLidarDriver);
+  EXPECT_TRUE(at_once.degraded);
+  EXPECT_TRUE(cyclesWith(bench, 45, 1.0).degraded);
+  EXPECT_FALSE(cyclesWith(bench, 10, 1.0).degraded);
+}
+
+TEST(Arbiter, AnUnsureSourceAloneStops) {
+  ArbiterBench bench;
+  bench.give_proposal = false;
+  bench.parameters.sources.resize(1);
+  ASSERT_EQ(bench.parameters.sources[0].source, Source::kLidarDriver);
+  bench.arbiter = std::make_unique<Arbiter>(bench.parameters, bench.truck);
+  cyclesWith(bench, 5, 1.0);
+  bench.state = {true, false, Reason::kNone};
+  EXPECT_FALSE(cyclesWith(bench, 10, 1.0).command.stop);
+  const Decision& decision = cyclesWith(bench, 1, 0.0);
+  EXPECT_TRUE(decision.command.stop);
+  EXPECT_EQ(decision.command.reason, Reason::kLowConfidence);
+}
+
+TEST(Arbiter, AnUnsureSourceBelowTheOneThatSteersSlowsNothing) {
+  ArbiterBench bench;
+  bench.drive();
+  for (int i = 0; i < 10; ++i) {
+    bench.arbiter->setProposal(Source::kTeleoperation, bench.proposal(), bench.now);
+    EXPECT_FALSE(cyclesWith(bench, 1, 0.0).degraded);
+  }
+}
+
+TEST(Arbiter, AnUnsureSourceGivesNoSpeed) {
+  ArbiterBench bench;
+  bench.drive();
+  drivers::Proposal slow = lidarProposal(bench, 0.0);
+  slow.speed = 0.2;
+  bench.arbiter->setProposal(Source::kLidarDriver, slow, bench.now);
+  EXPECT_NE(bench.cycle().speed_source, Source::kLidarDriver);
+}
+
+TEST(Arbiter, DriversThatDisagreeForAFifthOfASecondDriveSlowly) {
+  ArbiterBench bench;
+  bench.drive();
+  const double beyond = bench.parameters.disagreement_angle + 0.001;
+  EXPECT_FALSE(cyclesWith(bench, 10, 1.0, beyond).degraded);
+  const Decision& decision = cyclesWith(bench, 2, 1.0, beyond);
+  EXPECT_TRUE(decision.degraded);
+  EXPECT_EQ(decision.command.reason, Reason::kDriversDisagree);
+  EXPECT_FALSE(decision.command.stop);
+}
+
+TEST(Arbiter, DriversThatDisagreeNowAndThenDriveOn) {
+  ArbiterBench bench;
+  bench.drive();
+  const double beyond = bench.parameters.disagreement_angle + 0.001;
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_FALSE(cyclesWith(bench, 9, 1.0, beyond).degraded);
+    EXPECT_FALSE(cyclesWith(bench, 1, 1.0, beyond - 0.002).degraded);
+  }
+}
+
 // Each pair of sources, each way: the hand-over stays within the rate limit.
 TEST(Arbiter, AHandOverIsNoJump) {
   const std::vector<Source> sources = {Source::kPreviewDriver, Source::kLidarDriver,
@@ -530,7 +637,7 @@ TEST(Arbiter, ADecisionTwiceAtOneTimeMovesNothing) {
 
 TEST(Arbiter, EveryReasonHasItsOwnGravity) {
   std::set<int> seen;
-  for (int code = 1; code <= static_cast<int>(Reason::kSpeedImplausible); ++code) {
+  for (int code = 1; code <= static_cast<int>(Reason::kDriversDisagree); ++code) {
     EXPECT_TRUE(seen.insert(gravity(static_cast<Reason>(code))).second) << code;
   }
   EXPECT_EQ(gravity(Reason::kNone), 0);

@@ -3,6 +3,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "../drivers/random_network.h"
 #include "program.h"
 
 namespace tunnel_pilot {
@@ -79,6 +80,22 @@ TEST_F(Evaluate, SummaryIsJsonWithTheFingerprintsOfWhatWasRun) {
   EXPECT_EQ(json.at("episodes").size(), 2u);
 }
 
+TEST_F(Evaluate, ALidarDriversNetworkIsNamedInTheSummaryAndItsShareTold) {
+  const std::string file =
+      scenario("{metric: lidar_driver_share, paper: '-', judge: every_seed, min: 0.0}");
+  neural::NetworkFile network = drivers::randomNetwork();
+  neural::saveNetwork(place_.file("network.yaml"), network);
+  for (const std::string driver : {"lidar_driver", "all"}) {
+    const Outcome outcome = evaluate({file, "--seeds", "1", "--driver", driver, "--network",
+                                      place_.file("network.yaml"), "--out", place_.file(driver)});
+    ASSERT_EQ(outcome.status, 0) << outcome.output;
+    const auto json = nlohmann::json::parse(contentOf(place_.file(driver + "/short/summary.json")));
+    EXPECT_EQ(json.at("driver"), driver);
+    EXPECT_EQ(json.at("sha256").at("network"), network.sha256);
+    EXPECT_GT(json.at("episodes")[0].at("metrics").at("lidar_driver_share").get<double>(), 0.0);
+  }
+}
+
 TEST_F(Evaluate, BadInputExitsTwoAndSaysWhy) {
   const std::string good = scenario("{metric: completed, paper: '-', judge: every_seed, min: 1.0}");
   std::string far = contentOf(good);
@@ -93,6 +110,11 @@ TEST_F(Evaluate, BadInputExitsTwoAndSaysWhy) {
       {{good, "--seeds", "many"}, "seeds"},
       {{good, "--jobs", "0"}, "--jobs"},
       {{good, "--colour", "red"}, "colour"},
+      {{good, "--driver", "somebody"}, "--driver"},
+      {{good, "--network", "here.yaml"}, "--network"},
+      {{good, "--driver", "lidar_driver", "--network", "nowhere.yaml"}, "nowhere.yaml: does not exist"},
+      {{kPackage + "/scenarios/lane_change_single.yaml", "--driver", "all"},
+       "lidar_driver cannot drive it"},
       {{good, "--config", place_.file("none")}, "none"},
       {{good, "--seeds", "1", "--out", "/dev/null/out"}, "/dev/null/out"},
       {{kPackage + "/config/truck.yaml"}, "truck.yaml"},
@@ -114,7 +136,8 @@ TEST_F(Evaluate, AFolderThatCannotBeIsToldBeforeTheRuns) {
 TEST_F(Evaluate, HelpExplainsItsOptions) {
   const Outcome outcome = evaluate({"--help"});
   EXPECT_EQ(outcome.status, 0);
-  for (const char* option : {"--seeds", "--out", "--jobs", "--config", "Exit status"}) {
+  for (const char* option :
+       {"--seeds", "--out", "--jobs", "--config", "--driver", "--network", "Exit status"}) {
     EXPECT_NE(outcome.output.find(option), std::string::npos) << option;
   }
 }

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "tunnel_pilot/drivers/lidar_driver.h"
+
 namespace tunnel_pilot::learning {
 
 /// One moment of a drive: what the driver saw, and the articulation it should demand.
@@ -17,6 +19,12 @@ struct Example {
   float label = 0.0F;                ///< articulation to demand [rad]
   std::uint32_t tunnel = 0;          ///< it was driven in: examples of one tunnel stay together
 };
+
+inline drivers::TruckInputs truckInputsOf(const Example& example) {
+  return {static_cast<double>(example.articulation), static_cast<double>(example.articulation_ahead),
+          static_cast<double>(example.speed), static_cast<double>(example.yaw_gain),
+          static_cast<double>(example.yaw_disturbance)};
+}
 
 using DataSet = std::vector<Example>;
 

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <optional>
 
 #include "tunnel_pilot/learning/data_set.h"
 #include "tunnel_pilot/learning/teacher.h"
@@ -31,6 +32,8 @@ class DriveCollector : public simulation::DriveObserver {
   Stamp delay_;
   std::uint32_t tunnel_;
   std::deque<Pending> pending_;
+  std::optional<TruckBesideLine> last_;  ///< truth before the newest
+  Stamp last_stamp_{};
   DataSet examples_;
 };
 

@@ -16,10 +16,11 @@ struct SceneSpread {
   double offset = 0.7;          ///< [m] largest
   double heading = 0.25;        ///< [rad] largest
   double articulation = 0.2;    ///< [rad] largest
-  double rate = 0.12;           ///< [rad/s] largest
+  double lean = 0.04;           ///< of the demand on the way on from there [rad] largest
   double speed_min = 2.0, speed_max = 3.2;  ///< [m/s]
   double gain_min = 0.7, gain_max = 1.25;   ///< yaw gain g [1]
   double disturbance = 0.006;               ///< d, largest [1/m]
+  double bias_error = 0.5;                  ///< share of the articulation sensor's bias not learned
   double ahead_error = 0.005;               ///< of the articulation foretold, standard deviation [rad]
 };
 

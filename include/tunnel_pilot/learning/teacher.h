@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "tunnel_pilot/drivers/preview_driver.h"
 #include "tunnel_pilot/drivers/preview_planner.h"
 #include "tunnel_pilot/geometry/path.h"
@@ -32,7 +34,15 @@ class Teacher {
   TruckBesideLine movedOn(const geometry::Path& line, const TruckBesideLine& truck,
                           const drivers::YawResponse& believed, double time) const;
 
+  /// The truck moved on for `time` [s] with a constant demand `command` [rad] acting on it.
+  TruckBesideLine steered(const geometry::Path& line, const TruckBesideLine& truck,
+                          const drivers::YawResponse& believed, double command, double time) const;
+
  private:
+  TruckBesideLine moved(const geometry::Path& line, const TruckBesideLine& truck,
+                        const drivers::YawResponse& believed, double time,
+                        const std::optional<double>& command) const;
+
   drivers::PreviewDriverParameters parameters_;
   drivers::TruckResponse response_;
   drivers::PreviewPlanner planner_;

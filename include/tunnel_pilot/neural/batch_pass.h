@@ -34,6 +34,7 @@ class BatchPass {
   const Network* network_;
   std::vector<std::vector<double>> values_;     ///< input, then each layer's output
   std::vector<std::vector<double>> gradients_;  ///< dE/d of the same
+  std::vector<double> transposed_;              ///< a layer's input, lane after lane
 };
 
 }  // namespace tunnel_pilot::neural

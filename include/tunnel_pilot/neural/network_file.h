@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -41,6 +42,16 @@ struct OutputGroup {
   double width = 0.0;    ///< Gaussian: c of exp(-(d / spacing)^2 / c) [1]
 };
 
+/// Where the inputs lay in training: d^2 = |W (f - mean)|^2 of n features f of the inputs, W lower
+/// triangular (Mahalanobis distance).
+struct InputDomain {
+  static constexpr std::size_t kMaxSize = 256;
+  std::string meaning;            ///< which features
+  double limit = 0.0;             ///< of d^2: nearly all of training lay within [1]
+  std::vector<double> mean;       ///< n
+  std::vector<double> whitening;  ///< W's lower triangle, row after row: n (n + 1) / 2
+};
+
 /// A network with everything that is needed to use it: the content of a file of networks/.
 struct NetworkFile {
   std::string name;
@@ -49,6 +60,7 @@ struct NetworkFile {
   OutputGroup output;
   std::string training;  ///< how it came to be: program, data, seeds, figures; free text
   std::string sha256;    ///< of the file's content but for this line; set by load and save
+  std::optional<InputDomain> domain = std::nullopt;
 };
 
 /// Reads and checks a network file (docs/neural.md): at most 64 MiB, format, version, SHA-256, no

@@ -2,6 +2,7 @@
 
 #include <nav_msgs/Odometry.h>
 #include <tunnel_pilot/ArbiterState.h>
+#include <tunnel_pilot/Proposal.h>
 #include <tunnel_pilot/TruckCommand.h>
 #include <tunnel_pilot/TruckStatus.h>
 #include <tunnel_pilot/TunnelState.h>
@@ -26,10 +27,11 @@ struct StatusInput {
   std::optional<TruckCommand> command;
   std::optional<TunnelState> tunnel;
   std::optional<nav_msgs::Odometry> odometry;
+  std::optional<Proposal> network;  ///< lidar_driver's
 };
 
 /// What an operator wants to read beside the truck: the safety state and mode, the one reason why it
-/// does what it does, who steers, the speed and what limits it, the distance that is free and the one
+/// does what it does, who steers and how sure the network is, the speed and what limits it, the distance that is free and the one
 /// that a stop takes, and where the truck is in the tunnel or why that is not known.
 StatusText describe(const StatusInput& input);
 

@@ -24,6 +24,12 @@ struct Setup {
 /// Throws config::ConfigError.
 Setup loadSetup(const Scenario& scenario);
 
+/// Lets these drivers propose. The lidar driver's network is read from the file `network`, or from the
+/// one that config/lidar_driver.yaml names when it is empty. Throws config::ConfigError, also for a
+/// scenario in which no scan is driven on.
+void chooseDriver(const Scenario& scenario, DriverChoice driver, const std::string& network,
+                  Setup& setup);
+
 /// The plant that a seed drives: with its own parameters where the scenario varies them, and its own
 /// road.
 std::unique_ptr<vehicle::Plant> makePlant(const PlantChoice& choice,

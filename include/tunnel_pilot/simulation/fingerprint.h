@@ -15,6 +15,8 @@ struct Fingerprints {
   std::string controller;  ///< the parameter files of the pilot
   std::string plant;       ///< those of truck and simulator
   std::string world;       ///< empty without a world
+  std::string driver{"preview_driver"};  ///< who proposed: the name of a DriverChoice
+  std::string network{};                 ///< the lidar driver's; empty without
 };
 
 }  // namespace tunnel_pilot::simulation

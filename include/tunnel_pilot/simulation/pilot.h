@@ -17,6 +17,8 @@ namespace tunnel_pilot::simulation {
 /// Which drivers propose.
 enum class DriverChoice { kPreviewDriver, kLidarDriver, kAll };
 
+std::string toString(DriverChoice driver);
+
 /// The parameters of the pilot's stages, from the files of the config folder.
 struct PilotParameters {
   DriverChoice driver = DriverChoice::kPreviewDriver;

@@ -22,8 +22,9 @@ namespace tunnel_pilot::supervision {
 /// One row of the arbiter's table.
 struct SourceRule {
   Source source;
-  int priority;    ///< the highest healthy one steers
-  double max_age;  ///< since its proposal was received [s]
+  int priority;           ///< the highest healthy one steers
+  double max_age;         ///< since its proposal was received [s]
+  double min_confidence;  ///< less sure, it is not healthy [1]
   bool steers;
   bool gives_speed;  ///< the lowest speed of all healthy sources wins
 };
@@ -47,6 +48,8 @@ struct ArbiterParameters {
   double tracking_tolerance;    ///< articulation from its expected answer [rad]
   double tracking_time;         ///< [s]
   int limit_hits;               ///< of angle or lateral acceleration within recovery_time: slowly
+  double disagreement_angle;    ///< between lidar and preview driver: slowly [rad]
+  double disagreement_time;     ///< that it lasts [s]
   double clock_jump;            ///< a pause of the clock beyond this is a jump [s]
   SpeedGovernorParameters governor;
   EnvelopeParameters envelope;
@@ -129,7 +132,7 @@ class Arbiter {
     drivers::Proposal proposal;
     std::optional<Stamp> received;
   };
-  enum class Health { kNever, kStale, kInvalid, kUnable, kHealthy };
+  enum class Health { kNever, kStale, kInvalid, kUnable, kUnsure, kHealthy };
   /// How far the corridor ahead is free, and what ends it.
   struct FreeWay {
     double distance;  ///< [m]
@@ -165,8 +168,11 @@ class Arbiter {
   void assessTruck(Stamp now, Findings& findings) const;
   bool waitsForScan(const SourceRule& rule, Stamp now) const;
   void assessSources(Stamp now, Findings& findings) const;
+  void assessConfidence(Stamp now, Findings& findings) const;
   Findings assess(Stamp now) const;
   const SourceRule* bestSource(Stamp now) const;
+  const drivers::Proposal* healthyProposal(Source source, Stamp now) const;
+  void compareDrivers(Stamp now);
   Steering chooseSteering(Stamp now) const;
   std::optional<Steering> deadReckoning(Stamp now) const;
   std::optional<geometry::Pose> placeInCenterline(Stamp now) const;
@@ -190,6 +196,7 @@ class Arbiter {
   drivers::MotionHistory history_;
 
   std::array<Slot, 9> slots_;  ///< by Source
+  std::optional<Stamp> disagree_since_;  ///< lidar and preview driver
   perception::Walls walls_;
   std::vector<geometry::Point> points_;
   perception::TunnelState tunnel_state_;  ///< newest

@@ -51,6 +51,8 @@ enum class Reason : std::uint8_t {
   kStartUp = 22,
   kScanFrozen = 23,
   kSpeedImplausible = 24,
+  kLowConfidence = 25,       ///< a driver is less sure than its rule asks for
+  kDriversDisagree = 26,     ///< two drivers ask for different articulations
 };
 
 std::string toString(Mode mode);
