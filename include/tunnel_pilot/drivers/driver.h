@@ -28,4 +28,14 @@ struct Proposal {
   std::optional<geometry::Point> preview_point;  ///< in base_link, for the eyes [m]
 };
 
+/// A driver that follows the measured centerline.
+class PathDriver {
+ public:
+  virtual ~PathDriver() = default;
+
+  /// `tunnel` is that of the newest scan, `motion` the newest feedback; both at or before `now`.
+  virtual Proposal propose(const perception::Tunnel& tunnel, const Motion& motion, Stamp now) = 0;
+  virtual void reset() = 0;
+};
+
 }  // namespace tunnel_pilot::drivers
