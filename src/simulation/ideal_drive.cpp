@@ -19,7 +19,6 @@ geometry::Path unrolled(const geometry::Path& line, double from, double to) {
   std::vector<geometry::PathPoint> points;
   for (double s = from; s <= to; s += kStep) {
     geometry::PathPoint point = line.at(s);
-    if (!line.closed() && (s < 0.0 || s > line.length())) point.curvature = 0.0;
     point.s = s - from;
     points.push_back(point);
   }

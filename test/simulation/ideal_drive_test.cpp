@@ -71,11 +71,5 @@ TEST(IdealDrive, SlowsDownBeforeABendAndSpeedsUpBehindIt) {
   EXPECT_NEAR(time, fastest + slow_to_brake + slow_to_gain, 1.6) << "clothoids and reaction time apart";
 }
 
-TEST(IdealDrive, BeyondTheEndOfAnOpenLineNothingSlowsDown) {
-  const double k = 1.0 / 12.0;
-  const geometry::Path line = geometry::buildPath({{100.0, 0.0, 0.0}, {10.0, 0.0, k}}, {}, 0.25);
-  EXPECT_NEAR(idealTime(line, {0.0, 60.0, 4.0, 4.0, 0.8, 100.0}), 15.0, 1e-9);
-}
-
 }  // namespace
 }  // namespace tunnel_pilot::simulation

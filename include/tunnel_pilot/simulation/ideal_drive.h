@@ -19,7 +19,7 @@ struct IdealDrive {
 /// Shortest time [s] for the way that the governor allows: at each place the lowest of the top speed,
 /// the governor's limit along the true line, its stopping speed within the sight ahead of the nose, and
 /// what the acceleration gave: v^2 grows by at most 2 a ds. Slowing down is as the governor asks, the
-/// jerk is not limited. A closed line is driven on around; an open one is straight beyond its end. The
+/// jerk is not limited. A closed line is driven on around; an open one bends on as at its end. The
 /// line must not be empty, top_speed and acceleration must be positive.
 double idealDriveTime(const geometry::Path& line, const IdealDrive& drive,
                       const supervision::SpeedGovernor& governor, const vehicle::TruckGeometry& truck);
