@@ -21,7 +21,10 @@ std::size_t size(config::Node& node, const std::string& key, std::int64_t min, s
 NetworkDesign loadDesign(config::Node node) {
   NetworkDesign design;
   design.inverse_ranges = node.choice("ranges", {"linear", "inverse"}) == "inverse";
-  design.truck = node.boolean("truck");
+  const std::string truck = node.choice("truck", {"none", "articulation", "all"});
+  design.truck = truck == "all"            ? NetworkDesign::Truck::kAll
+                 : truck == "articulation" ? NetworkDesign::Truck::kArticulation
+                                           : NetworkDesign::Truck::kNone;
   for (config::Node& layer : node.children("convolutions")) {
     design.convolutions.push_back(
         {size(layer, "channels", 1, 256), size(layer, "kernel", 1, 101), size(layer, "stride", 1, 16)});
@@ -137,8 +140,10 @@ neural::NetworkFile makeNetwork(const NetworkDesign& design, const std::string& 
     inputs.push_back({"ranges", "m", drivers::LidarInputs::kBeams, InputGroup::Transform::kLinear, 0.0,
                       40.0, 0.0, 40.0});
   }
-  if (design.truck) {
+  if (design.truck != NetworkDesign::Truck::kNone) {
     inputs.push_back(truckInput("articulation", "rad", 0.0, 0.4, -0.79, 0.79));
+  }
+  if (design.truck == NetworkDesign::Truck::kAll) {
     inputs.push_back(truckInput("articulation_ahead", "rad", 0.0, 0.4, -0.79, 0.79));
     inputs.push_back(truckInput("speed", "m/s", 3.0, 2.0, 0.0, 10.0));
     inputs.push_back(truckInput("yaw_gain", "1", 1.0, 0.2, 0.5, 1.5));

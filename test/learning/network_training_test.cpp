@@ -60,7 +60,7 @@ DataSet madeUp(std::size_t count, std::uint64_t seed) {
 }
 
 NetworkDesign smallDesign(bool gaussian) {
-  return {true, false, {}, {6}, neural::Activation::kTanh, gaussian};
+  return {true, NetworkDesign::Truck::kNone, {}, {6}, neural::Activation::kTanh, gaussian};
 }
 
 TrainingOptions quickTraining() {
@@ -219,10 +219,10 @@ TEST(SceneSampler, DrivesWithinWhatTheGovernorAllows) {
   }
 }
 
-TEST(Recipe, ThePapersNetworkHasThePapersSizes) {
+TEST(Recipe, ThePapersNetworkHasThePapersSizesAndTheArticulation) {
   const Recipe recipe = loadRecipe(kSource + "/recipes/lidar_761_5_31.yaml");
   const neural::NetworkFile network = makeNetwork(recipe.design, recipe.name);
-  EXPECT_EQ(network.network.parameters().size(), 761U * 5 + 5 + 5 * 31 + 31);
+  EXPECT_EQ(network.network.parameters().size(), 762U * 5 + 5 + 5 * 31 + 31);
 }
 
 TEST(Recipe, AllShippedOnesLoad) {

@@ -20,7 +20,8 @@ struct NetworkDesign {
     std::size_t channels, kernel, stride;
   };
   bool inverse_ranges;                    ///< 1/r instead of r
-  bool truck;                             ///< takes all of drivers::TruckInputs beside the scan
+  enum class Truck { kNone, kArticulation, kAll };
+  Truck truck;                            ///< which of drivers::TruckInputs stand beside the scan
   std::vector<Convolution> convolutions;  ///< over the scan, rectified
   std::vector<std::size_t> hidden;        ///< dense layers
   neural::Activation activation;          ///< theirs
