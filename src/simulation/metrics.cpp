@@ -23,6 +23,7 @@ const std::vector<MetricText>& metricTexts() {
       {"lateral_mean", "lateral offset, mean", "mm", 1e3},
       {"lateral_rms", "lateral offset, RMS", "m", 1.0},
       {"lateral_max", "lateral offset, largest", "m", 1.0},
+      {"inside_mean", "lateral offset to the inside of bends, mean", "mm", 1e3},
       {"heading_mean", "heading error, mean", "deg", kDegrees},
       {"heading_rms", "heading error, RMS", "deg", kDegrees},
       {"heading_rms_straights", "heading error on straights, RMS", "deg", kDegrees},
@@ -121,7 +122,7 @@ double quantile(std::vector<double> values, double share) {
 }
 
 Metrics driveMetrics(const std::vector<TrackSample>& track, const geometry::Path& line) {
-  Moments lateral, heading, heading_straight, speed;
+  Moments lateral, inside, heading, heading_straight, speed;
   std::map<int, Moments>
       hinge;  // by straight: each has a mean of its own, by the sensor's bias and slip
   double clearance = std::numeric_limits<double>::infinity();
@@ -131,6 +132,9 @@ Metrics driveMetrics(const std::vector<TrackSample>& track, const geometry::Path
     clearance = std::min(clearance, sample.clearance);
     if (std::abs(sample.speed) < kStandstill) continue;
     lateral.add(sample.lateral_offset);
+    if (!line.empty() && !isStraight(line, sample.station)) {
+      inside.add(std::copysign(1.0, line.at(sample.station).curvature) * sample.lateral_offset);
+    }
     heading.add(sample.heading_error);
     speed.add(sample.speed);
     if (isStraight(line, sample.station)) heading_straight.add(sample.heading_error);
@@ -144,16 +148,18 @@ Metrics driveMetrics(const std::vector<TrackSample>& track, const geometry::Path
     wobble.squares += moments.deviation() * moments.deviation() * static_cast<double>(moments.count);
     wobble.count += moments.count;
   }
-  return {{"lateral_mean", lateral.mean()},
-          {"lateral_rms", lateral.rms()},
-          {"lateral_max", lateral.largest},
-          {"heading_mean", heading.mean()},
-          {"heading_rms", heading.rms()},
-          {"heading_rms_straights", heading_straight.rms()},
-          {"articulation_std_straights", wobble.rms()},
-          {"clearance_min", clearance},
-          {"speed_mean", speed.mean()},
-          {"distance", track.empty() ? 0.0 : track.back().station - track.front().station}};
+  Metrics metrics = {{"lateral_mean", lateral.mean()},
+                     {"lateral_rms", lateral.rms()},
+                     {"lateral_max", lateral.largest},
+                     {"heading_mean", heading.mean()},
+                     {"heading_rms", heading.rms()},
+                     {"heading_rms_straights", heading_straight.rms()},
+                     {"articulation_std_straights", wobble.rms()},
+                     {"clearance_min", clearance},
+                     {"speed_mean", speed.mean()},
+                     {"distance", track.empty() ? 0.0 : track.back().station - track.front().station}};
+  if (inside.count > 0) metrics["inside_mean"] = inside.mean();
+  return metrics;
 }
 
 Metrics returnMetrics(const std::vector<TrackSample>& track) {

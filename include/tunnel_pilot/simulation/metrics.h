@@ -56,8 +56,8 @@ struct MetricText {
 const MetricText& metricText(const std::string& key);
 bool isMetric(const std::string& key);
 
-/// Figures of a drive along `line` (a tunnel's design line): lateral_mean, _rms, _max; heading_mean,
-/// _rms over all, and heading_rms_straights where the line is straight; articulation_std_straights where
+/// Figures of a drive along `line` (a tunnel's design line): lateral_mean, _rms, _max; inside_mean
+/// of the offset towards the inside of bends, where there are any; heading_mean, _rms over all, and heading_rms_straights where the line is straight; articulation_std_straights where
 /// it has been straight for 10 m and stays so for 3 m (before that the hinge is still unwinding, by
 /// geometry); clearance_min, speed_mean, distance. Samples at standstill do not count.
 Metrics driveMetrics(const std::vector<TrackSample>& track, const geometry::Path& line);
