@@ -9,6 +9,7 @@ namespace tunnel_pilot::drivers {
 namespace {
 
 constexpr double kPredictionStep = 0.03;  // [s]
+constexpr double kLeastSpan = 1e-6;       // [s] the model divides by its steps
 constexpr double kOffsetJump = 0.5;       // [m] beyond, the filter starts anew
 constexpr double kHeadingJump = 0.15;     // [rad]
 
@@ -118,7 +119,8 @@ PathState PathPredictor::overDeadTime(const perception::Tunnel& tunnel, const ge
   PathState state{driven.s, driven.offset, driven.heading, motion.articulation, 0.0};
   PathCursor cursor(tunnel.centerline, state.s);
   double heading = cursor.headingAt(state.s);
-  const double span = std::clamp(toSeconds(now - motion.stamp), 0.0, 0.3) + toSeconds(steering_.delay());
+  const double known = std::clamp(toSeconds(now - motion.stamp), 0.0, 0.3) + toSeconds(steering_.delay());
+  const double span = std::max(known, kLeastSpan);
   const int steps = std::max(1, static_cast<int>(std::ceil(span / kPredictionStep)));
   const double step = span / steps;
   const double share = lagShare(step, truck_.lag);

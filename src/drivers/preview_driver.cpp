@@ -4,25 +4,6 @@
 
 namespace tunnel_pilot::drivers {
 
-PreviewDriverParameters loadPreviewDriver(config::Node node) {
-  PreviewDriverParameters p{};
-  p.speed = node.number("speed", "m/s", 0.1, 15.0);
-  p.planning_speed = node.number("planning_speed", "m/s", 0.1, 3.0);
-  p.preview_time = node.number("preview_time", "s", 0.1, 5.0);
-  p.step = node.number("step", "s", 0.02, 0.5);
-  config::Node weights = node.child("weights");
-  p.weights.offset = weights.number("offset", "1/m^2", 1e-3, 1e3);
-  p.weights.heading = weights.number("heading", "1/rad^2", 0.0, 1e4);
-  p.weights.slope = weights.number("slope", "m^2/rad^2", 1e-2, 1e5);
-  p.weights.slope_speed = weights.number("slope_speed", "m/s", 0.1, 10.0);
-  p.weights.terminal = weights.number("terminal", "1", 1.0, 1e3);
-  p.weights.rate_share = weights.number("rate_share", "1", 0.3, 1.0);
-  weights.finish();
-  p.truck = loadPathPredictor(node);
-  node.finish();
-  return p;
-}
-
 PreviewDriver::PreviewDriver(const PreviewDriverParameters& parameters,
                              const vehicle::TruckGeometry& geometry)
     : parameters_(parameters),
@@ -42,8 +23,7 @@ Proposal PreviewDriver::propose(const perception::Tunnel& tunnel, const Motion& 
 
   const double elapsed = predictor_.elapsed(now);
   const double speed = std::max(motion.speed, parameters_.planning_speed);
-  const double rate =
-      planner_.plan(*start, tunnel.centerline, speed, predictor_.learned(), elapsed);
+  const double rate = planner_.plan(*start, tunnel.centerline, speed, predictor_.learned(), elapsed);
 
   proposal.valid = true;
   proposal.articulation_angle = predictor_.give(start->command + rate * elapsed, *start, now);

@@ -19,7 +19,8 @@ TruckBesideLine between(const TruckBesideLine& a, const TruckBesideLine& b, doub
 
 DriveCollector::DriveCollector(const simulation::Setup& setup, std::uint32_t tunnel)
     : teacher_(setup.pilot.preview_driver, setup.truck.geometry),
-      delay_(fromSeconds(setup.pilot.preview_driver.truck.steering.transport_delay + setup.pilot.preview_driver.truck.steering.dead_time)),
+      delay_(fromSeconds(setup.pilot.preview_driver.truck.steering.transport_delay +
+                         setup.pilot.preview_driver.truck.steering.dead_time)),
       tunnel_(tunnel) {}
 
 void DriveCollector::afterScan(const simulation::Simulator& simulator, const simulation::Pilot& pilot) {
@@ -53,8 +54,8 @@ void DriveCollector::afterTruth(const simulation::Simulator& simulator) {
     const drivers::YawResponse believed{static_cast<double>(example.yaw_gain),
                                         static_cast<double>(example.yaw_disturbance)};
     const double share = toSeconds(pending.due - last_stamp_) / toSeconds(truth.stamp - last_stamp_);
-    example.label = static_cast<float>(teacher_.command(simulator.world().design_line,
-                                                        between(*last_, now, share), believed));
+    example.label = static_cast<float>(
+        teacher_.command(simulator.world().design_line, between(*last_, now, share), believed));
     if (std::isfinite(example.label)) examples_.push_back(std::move(example));
   }
   last_ = now;

@@ -3,246 +3,312 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <condition_variable>
-#include <limits>
-#include <mutex>
+#include <exception>
+#include <functional>
 #include <optional>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
+#include "barrier.h"
 #include "tunnel_pilot/drivers/lidar_driver.h"
 #include "tunnel_pilot/learning/input_projection.h"
 #include "tunnel_pilot/neural/adam.h"
 #include "tunnel_pilot/neural/batch_pass.h"
+#include "tunnel_pilot/neural/early_stopping.h"
 #include "tunnel_pilot/neural/gaussian_code.h"
+#include "tunnel_pilot/neural/loss.h"
 #include "tunnel_pilot/simulation/random.h"
 
 namespace tunnel_pilot::learning {
 namespace {
 
+using Eigen::Index;
 using neural::BatchPass;
-constexpr std::size_t kLanes = BatchPass::kLanes;
-constexpr std::size_t kGroups = 2;  // of kLanes examples in one step
-constexpr double kLeastProbability = 1e-9;
 
-struct Loss {
-  double entropy = 0.0;
-  double squares = 0.0;
+constexpr std::size_t kLanes = BatchPass::kLanes;
+constexpr std::size_t kThreads = 2;  // each takes kLanes examples of a step
+constexpr std::size_t kBatch = kThreads * kLanes;
+constexpr Index kProjectedAtOnce = 4096;      // examples
+constexpr Index kProjectionExamples = 20000;  // that the components are found from, and as many mirrored
+constexpr double kLastRate = 0.01;            // share of the first one
+
+struct Error {
+  double loss = 0.0;
+  double squares = 0.0;  // [rad^2]
   std::size_t count = 0;
+
+  void add(const Error& other) {
+    loss += other.loss;
+    squares += other.squares;
+    count += other.count;
+  }
+  double meanLoss() const { return loss / static_cast<double>(std::max<std::size_t>(count, 1)); }
+  double rms() const {
+    return std::sqrt(squares / static_cast<double>(std::max<std::size_t>(count, 1)));
+  }
 };
 
-// The inputs of examples, one column each, or of their mirror images.
-Eigen::MatrixXf inputsOf(const neural::NetworkFile& file, const DataSet& examples, bool mirrored) {
+// Raw inputs of examples [first, last), one column each, or of their mirror images.
+Eigen::MatrixXf rawInputs(const neural::NetworkFile& file, const DataSet& examples, Index first,
+                          Index last, Index step, bool mirrored) {
   drivers::LidarInputs inputs(file.inputs, file.name);
-  Eigen::MatrixXf columns(static_cast<Eigen::Index>(inputs.size()),
-                          static_cast<Eigen::Index>(examples.size()));
-  for (std::size_t i = 0; i < examples.size(); ++i) {
-    float* column = columns.col(static_cast<Eigen::Index>(i)).data();
-    if (!inputs.fill(examples[i].ranges, truckInputsOf(examples[i]), column)) {
-      throw std::runtime_error("an example without usable ranges");
+  Eigen::MatrixXf columns(static_cast<Index>(inputs.size()), (last - first + step - 1) / step);
+  for (Index i = first, column = 0; i < last; i += step, ++column) {
+    const Example& example = examples[static_cast<std::size_t>(i)];
+    float* values = columns.col(column).data();
+    if (!inputs.fill(example.ranges, truckInputsOf(example), values)) {
+      throw std::invalid_argument("example " + std::to_string(i) + " has no usable ranges");
     }
-    if (mirrored) inputs.fillMirrored(column);
+    if (mirrored) inputs.fillMirrored(values);
   }
   return columns;
+}
+
+// Inputs as the trained network takes them, piece by piece: the raw ones of all would fill the memory.
+Eigen::MatrixXf inputsOf(const neural::NetworkFile& file, const DataSet& examples,
+                         const std::optional<InputProjection>& projection, bool mirrored) {
+  const auto count = static_cast<Index>(examples.size());
+  if (!projection) return rawInputs(file, examples, 0, count, 1, mirrored);
+  Eigen::MatrixXf columns(static_cast<Index>(projection->size()), count);
+  for (Index first = 0; first < count; first += kProjectedAtOnce) {
+    const Index last = std::min(first + kProjectedAtOnce, count);
+    columns.middleCols(first, last - first) =
+        projection->project(rawInputs(file, examples, first, last, 1, mirrored));
+  }
+  return columns;
+}
+
+// From examples spread over all, both ways round.
+InputProjection projectionOf(const neural::NetworkFile& file, const DataSet& examples,
+                             std::size_t components) {
+  const auto count = static_cast<Index>(examples.size());
+  const Index step = std::max<Index>(1, count / kProjectionExamples);
+  const Eigen::MatrixXf plain = rawInputs(file, examples, 0, count, step, false);
+  const Eigen::MatrixXf mirrored = rawInputs(file, examples, 0, count, step, true);
+  Eigen::MatrixXf both(plain.rows(), plain.cols() + mirrored.cols());
+  both << plain, mirrored;
+  return {both, drivers::LidarInputs::kBeams, components};
 }
 
 // One thread's share of a step: kLanes examples through the network and back.
 class Worker {
  public:
-  Worker(const neural::Network& network, const neural::NetworkFile& file, double decode_weight)
+  Worker(const neural::Network& network, const neural::OutputGroup& output)
       : pass_(network),
-        code_(file.network.outputs(), file.output.first, file.output.spacing, file.output.width),
-        decode_weight_(decode_weight),
-        targets_(file.network.outputs()),
-        outputs_(file.network.outputs()),
-        derivatives_(file.network.outputs()),
-        spacing_(file.output.spacing),
-        gradient_(network.parameters().size()) {}
+        output_(output),
+        rows_(network.inputs()),
+        targets_(network.outputs()),
+        outputs_(network.outputs()),
+        derivatives_(network.outputs()),
+        gradient_(network.parameters().size()) {
+    if (output.code == neural::OutputGroup::Code::kGaussian) {
+      code_.emplace(network.outputs(), output.first, output.spacing, output.width);
+    }
+  }
 
-  void load(std::size_t lane, const float* inputs, std::size_t count, double label) {
-    for (std::size_t i = 0; i < count; ++i) pass_.input(i)[lane] = static_cast<double>(inputs[i]);
+  void load(std::size_t lane, const float* inputs, double label) {
+    for (std::size_t row = 0; row < rows_; ++row) {
+      pass_.input(row)[lane] = static_cast<double>(inputs[row]);
+    }
     labels_[lane] = label;
   }
 
-  // Loss of the first `count` lanes; with `learn`, their gradient is added up.
-  Loss run(std::size_t count, bool learn) {
+  // Error of the first `count` lanes; with `learn`, gradient() is theirs.
+  Error run(std::size_t count, bool learn) {
     pass_.forward();
-    Loss loss;
-    loss.count = count;
-    if (learn) std::fill(gradient_.begin(), gradient_.end(), 0.0);
-    for (std::size_t o = 0; o < targets_.size(); ++o)
-      std::fill_n(pass_.outputGradient(o), kLanes, 0.0);
-    for (std::size_t lane = 0; lane < count; ++lane) judge(lane, loss);
-    if (learn) pass_.backward(gradient_);
-    return loss;
+    for (std::size_t o = 0; o < outputs_.size(); ++o) std::fill_n(pass_.outputGradient(o), kLanes, 0.0);
+    Error error;
+    for (std::size_t lane = 0; lane < count; ++lane) error.add(judge(lane));
+    if (!learn) return error;
+    std::fill(gradient_.begin(), gradient_.end(), 0.0);
+    pass_.backward(gradient_);
+    return error;
   }
 
   const std::vector<double>& gradient() const { return gradient_; }
 
  private:
-  void judge(std::size_t lane, Loss& loss) {
-    code_.encode(labels_[lane], targets_.data());
-    for (std::size_t o = 0; o < targets_.size(); ++o) {
-      const double y = std::clamp(pass_.output(o)[lane], kLeastProbability, 1.0 - kLeastProbability);
-      const double t = targets_[o];
-      outputs_[o] = y;
-      const double floor = t > 0.0 && t < 1.0 ? t * std::log(t) + (1.0 - t) * std::log(1.0 - t) : 0.0;
-      loss.entropy += floor - t * std::log(y) - (1.0 - t) * std::log(1.0 - y);
-      pass_.outputGradient(o)[lane] = (y - t) / (y * (1.0 - y));
+  Error judge(std::size_t lane) {
+    for (std::size_t o = 0; o < outputs_.size(); ++o) outputs_[o] = pass_.output(o)[lane];
+    Error error;
+    error.count = 1;
+    double told;
+    if (code_) {
+      code_->encode(labels_[lane], targets_.data());
+      error.loss =
+          neural::crossEntropy(outputs_.data(), targets_.data(), outputs_.size(), derivatives_.data());
+      told = code_->decode(outputs_.data()).value;
+    } else {
+      targets_[0] = (labels_[lane] - output_.offset) / output_.scale;
+      error.loss = neural::halfSquaredError(outputs_.data(), targets_.data(), 1, derivatives_.data());
+      told = output_.offset + output_.scale * outputs_[0];
     }
-    const double error = code_.decode(outputs_.data(), derivatives_.data()) - labels_[lane];
-    loss.squares += error * error;
-    const double pull = decode_weight_ * error / (spacing_ * spacing_);
-    for (std::size_t o = 0; o < targets_.size(); ++o) pass_.outputGradient(o)[lane] += pull * derivatives_[o];
+    error.squares = (told - labels_[lane]) * (told - labels_[lane]);
+    for (std::size_t o = 0; o < outputs_.size(); ++o) pass_.outputGradient(o)[lane] = derivatives_[o];
+    return error;
   }
 
   BatchPass pass_;
-  neural::GaussianCode code_;
-  double decode_weight_;
-  std::vector<double> targets_;
-  std::vector<double> outputs_, derivatives_;
-  double spacing_;
+  neural::OutputGroup output_;
+  std::optional<neural::GaussianCode> code_;
+  std::size_t rows_;
+  std::vector<double> targets_, outputs_, derivatives_;
   std::array<double, kLanes> labels_{};
   std::vector<double> gradient_;
 };
 
-class Barrier {
+void onEachThread(const std::function<void(std::size_t)>& work) {
+  std::vector<std::thread> threads;
+  for (std::size_t t = 1; t < kThreads; ++t) threads.emplace_back(work, t);
+  work(0);
+  for (std::thread& thread : threads) thread.join();
+}
+
+// The training proper, of a network that takes the columns of `plain` and `mirrored`.
+class Training {
  public:
-  explicit Barrier(int count) : count_(count), waiting_(count) {}
-  void wait() {
-    std::unique_lock<std::mutex> lock(mutex_);
-    const int round = round_;
-    if (--waiting_ == 0) {
-      waiting_ = count_;
-      ++round_;
-      ready_.notify_all();
-    } else {
-      ready_.wait(lock, [&] { return round_ != round; });
-    }
+  Training(neural::Network& network, const neural::OutputGroup& output, const DataSet& examples,
+           const TrainingOptions& options)
+      : network_(network),
+        examples_(examples),
+        options_(options),
+        adam_(network.parameters().size(), {options.rate, 0.9, 0.999, 1e-8, options.weight_decay}),
+        random_(options.seed, simulation::Stream::kTraining),
+        shown_(examples.size()),
+        gradient_(network.parameters().size()) {
+    for (std::size_t t = 0; t < kThreads; ++t) workers_.emplace_back(network, output);
+    for (std::size_t i = 0; i < shown_.size(); ++i) shown_[i].example = i;
+    steps_ = std::max<std::size_t>(1, examples.size() / kBatch);
+  }
+
+  Error epoch(const Eigen::MatrixXf& plain, const Eigen::MatrixXf& mirrored) {
+    shuffle();
+    std::array<Error, kThreads> errors{};
+    Barrier learned(kThreads), stepped(kThreads);
+    onEachThread([&](std::size_t t) {
+      for (std::size_t s = 0; s < steps_; ++s) {
+        for (std::size_t lane = 0; lane < kLanes; ++lane) {
+          const Shown& shown = shown_[(s * kBatch + t * kLanes + lane) % shown_.size()];
+          const double label = static_cast<double>(examples_[shown.example].label);
+          const auto column = static_cast<Index>(shown.example);
+          workers_[t].load(lane, (shown.mirrored ? mirrored : plain).col(column).data(),
+                           shown.mirrored ? -label : label);
+        }
+        errors[t].add(workers_[t].run(kLanes, true));
+        learned.wait();
+        if (t == 0) step();
+        stepped.wait();
+      }
+    });
+    if (failure_) std::rethrow_exception(failure_);
+    for (std::size_t t = 1; t < kThreads; ++t) errors[0].add(errors[t]);
+    return errors[0];
+  }
+
+  Error check(const Eigen::MatrixXf& inputs, const DataSet& examples) {
+    std::array<Error, kThreads> errors{};
+    onEachThread([&](std::size_t t) {
+      for (std::size_t first = t * kLanes; first < examples.size(); first += kBatch) {
+        const std::size_t count = std::min(kLanes, examples.size() - first);
+        for (std::size_t lane = 0; lane < count; ++lane) {
+          workers_[t].load(lane, inputs.col(static_cast<Index>(first + lane)).data(),
+                           static_cast<double>(examples[first + lane].label));
+        }
+        errors[t].add(workers_[t].run(count, false));
+      }
+    });
+    for (std::size_t t = 1; t < kThreads; ++t) errors[0].add(errors[t]);
+    return errors[0];
   }
 
  private:
-  int count_, waiting_;
-  int round_ = 0;
-  std::mutex mutex_;
-  std::condition_variable ready_;
+  struct Shown {
+    std::size_t example = 0;
+    bool mirrored = false;
+  };
+
+  void shuffle() {
+    for (std::size_t i = shown_.size(); i > 1; --i) {
+      const auto other = static_cast<std::size_t>(random_.uniform() * static_cast<double>(i));
+      std::swap(shown_[i - 1], shown_[other]);
+    }
+    for (Shown& shown : shown_) shown.mirrored = random_.uniform() < 0.5;
+  }
+
+  void step() {
+    for (std::size_t i = 0; i < gradient_.size(); ++i) {
+      gradient_[i] = 0.0;
+      for (const Worker& worker : workers_) gradient_[i] += worker.gradient()[i];
+      gradient_[i] /= static_cast<double>(kBatch);
+    }
+    const double all = static_cast<double>(steps_) * options_.epochs;
+    const double share = std::min(1.0, static_cast<double>(done_++) / all);
+    const double fall = 0.5 * (1.0 + std::cos(M_PI * share));
+    try {
+      if (!failure_) {
+        adam_.step(network_.parameters(), gradient_, kLastRate + (1.0 - kLastRate) * fall);
+      }
+    } catch (...) {
+      failure_ = std::current_exception();  // the other thread waits: told after the epoch
+    }
+  }
+
+  neural::Network& network_;
+  const DataSet& examples_;
+  TrainingOptions options_;
+  std::vector<Worker> workers_;
+  neural::Adam adam_;
+  simulation::Random random_;
+  std::vector<Shown> shown_;
+  std::vector<double> gradient_;
+  std::size_t steps_;
+  std::size_t done_ = 0;
+  std::exception_ptr failure_;
 };
+
+// The same network with a first layer that takes the components.
+neural::Network innerNetwork(const neural::Network& outer, std::size_t inputs, std::uint64_t seed) {
+  std::vector<neural::Layer> layers = outer.layers();
+  layers.front() = neural::Layer::dense(inputs, layers.front().channels_out, layers.front().activation);
+  neural::Network inner(std::move(layers));
+  inner.randomise(seed);
+  return inner;
+}
 
 }  // namespace
 
 void trainNetwork(neural::NetworkFile& file, const DataSet& examples, const DataSet& validation,
                   const TrainingOptions& options,
                   const std::function<void(const TrainingProgress&)>& progress) {
-  Eigen::MatrixXf plain = inputsOf(file, examples, false);
-  Eigen::MatrixXf mirror = inputsOf(file, examples, true);
-  Eigen::MatrixXf checked = inputsOf(file, validation, false);
+  if (examples.empty() || validation.empty()) {
+    throw std::invalid_argument("training needs examples, and others from tunnels held out");
+  }
   std::optional<InputProjection> projection;
-  std::optional<neural::Network> inner;
-  if (file.network.layers().front().kind == neural::Layer::Kind::kDense && options.components > 0) {
-    const Eigen::Index few = std::min<Eigen::Index>(plain.cols(), 20000);
-    Eigen::MatrixXf sample(plain.rows(), 2 * few);  // spread over all, both ways round
-    for (Eigen::Index i = 0; i < few; ++i) {
-      sample.col(2 * i) = plain.col(i * plain.cols() / few);
-      sample.col(2 * i + 1) = mirror.col(i * plain.cols() / few);
-    }
-    projection.emplace(sample, drivers::LidarInputs::kBeams, options.components);
-    plain = projection->project(plain);
-    mirror = projection->project(mirror);
-    checked = projection->project(checked);
-    std::vector<neural::Layer> layers = file.network.layers();
-    layers.front() = neural::Layer::dense(projection->size(), layers.front().channels_out, layers.front().activation);
-    inner.emplace(layers);
-    inner->randomise(options.seed);
+  const bool dense = file.network.layers().front().kind == neural::Layer::Kind::kDense;
+  if (dense && options.components > 0) {
+    projection = projectionOf(file, examples, options.components);
   }
-  neural::Network& network = inner ? *inner : file.network;
-  const auto rows = static_cast<std::size_t>(plain.rows());
-  std::vector<Worker> workers;
-  for (std::size_t i = 0; i < kGroups; ++i) workers.emplace_back(network, file, options.decode_weight);
-  auto& parameters = network.parameters();
-  const std::vector<double> initial = parameters;
-  std::vector<double> best = parameters;
-  double best_error = std::numeric_limits<double>::infinity();
-  neural::Adam adam(parameters.size(), {options.rate, 0.9, 0.999, 1e-8, options.weight_decay});
-  simulation::Random random(options.seed, simulation::Stream::kTraining);
-  std::vector<std::uint32_t> order(examples.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<std::uint32_t>(i);
-  std::vector<std::uint8_t> mirrored(order.size());
-  const std::size_t batch = kGroups * kLanes;
-  const std::size_t steps = examples.size() / batch;
-  const auto total = static_cast<double>(steps * static_cast<std::size_t>(options.epochs));
-  std::vector<double> gradient(parameters.size());
-
-  const auto runGroups = [&](const auto& work) {  // each group on a thread of its own
-    if (options.threads < 2) {
-      for (std::size_t g = 0; g < kGroups; ++g) work(g);
-      return;
-    }
-    std::vector<std::thread> threads;
-    for (std::size_t g = 1; g < kGroups; ++g) threads.emplace_back([&work, g] { work(g); });
-    work(0);
-    for (auto& thread : threads) thread.join();
-  };
-
-  std::size_t done = 0;
+  neural::Network network =
+      projection ? innerNetwork(file.network, projection->size(), options.seed) : file.network;
+  const Eigen::MatrixXf plain = inputsOf(file, examples, projection, false);
+  const Eigen::MatrixXf mirrored = inputsOf(file, examples, projection, true);
+  const Eigen::MatrixXf held_out = inputsOf(file, validation, projection, false);
+  Training training(network, file.output, examples, options);
+  neural::EarlyStopping best(static_cast<std::size_t>(options.patience));
   for (int epoch = 1; epoch <= options.epochs; ++epoch) {
-    for (std::size_t i = order.size(); i > 1; --i) {
-      std::swap(order[i - 1], order[static_cast<std::size_t>(random.uniform() * static_cast<double>(i))]);
-    }
-    for (auto& m : mirrored) m = options.mirror && random.uniform() < 0.5 ? 1 : 0;
-    std::array<Loss, kGroups> losses{};
-    Barrier begin(kGroups), end(kGroups);
-    runGroups([&](std::size_t g) {
-      for (std::size_t s = 0; s < steps; ++s) {
-        for (std::size_t lane = 0; lane < kLanes; ++lane) {
-          const std::size_t at = s * batch + g * kLanes + lane;
-          const bool m = mirrored[at] != 0;
-          const double label = static_cast<double>(examples[order[at]].label);
-          workers[g].load(lane, (m ? mirror : plain).col(order[at]).data(), rows, m ? -label : label);
-        }
-        const Loss loss = workers[g].run(kLanes, true);
-        losses[g].entropy += loss.entropy;
-        losses[g].count += loss.count;
-        begin.wait();
-        if (g == 0) {
-          for (std::size_t i = 0; i < gradient.size(); ++i) {
-            gradient[i] = 0.0;
-            for (const Worker& worker : workers) gradient[i] += worker.gradient()[i];
-            gradient[i] /= static_cast<double>(batch);
-          }
-          const double share = static_cast<double>(done++) / total;
-          adam.step(parameters, gradient, 0.01 + 0.99 * 0.5 * (1.0 + std::cos(M_PI * share)));
-        }
-        end.wait();
-      }
-    });
-    Loss train;
-    for (const Loss& l : losses) train.entropy += l.entropy, train.count += l.count;
-    std::array<Loss, kGroups> checks{};
-    runGroups([&](std::size_t g) {
-      for (std::size_t first = g * kLanes; first < validation.size(); first += batch) {
-        const std::size_t count = std::min(kLanes, validation.size() - first);
-        for (std::size_t lane = 0; lane < count; ++lane) workers[g].load(lane, checked.col(static_cast<Eigen::Index>(first + lane)).data(), rows, static_cast<double>(validation[first + lane].label));
-        const Loss loss = workers[g].run(count, false);
-        checks[g].entropy += loss.entropy, checks[g].squares += loss.squares, checks[g].count += loss.count;
-      }
-    });
-    Loss check;
-    for (const Loss& l : checks) check.entropy += l.entropy, check.squares += l.squares, check.count += l.count;
-    const TrainingProgress now{epoch, train.entropy / static_cast<double>(train.count),
-                               check.entropy / static_cast<double>(check.count),
-                               std::sqrt(check.squares / static_cast<double>(check.count))};
-    if (!std::isfinite(now.loss) || !std::isfinite(now.validation_loss)) {
-      parameters = initial;
-      throw std::runtime_error("training diverged in epoch " + std::to_string(epoch));
-    }
-    if (now.validation_loss < best_error) {
-      best_error = now.validation_loss;
-      best = parameters;
-    }
-    progress(now);
+    const Error learned = training.epoch(plain, mirrored);
+    const Error checked = training.check(held_out, validation);
+    const bool enough = best.stop(checked.meanLoss(), network.parameters());
+    progress({epoch, learned.meanLoss(), checked.meanLoss(), checked.rms()});
+    if (enough) break;
   }
-  parameters = best;
-  if (inner) projection->unfold(*inner, file.network);
+  network.parameters() = best.bestParameters();
+  if (projection) {
+    projection->unfold(network, file.network);
+  } else {
+    file.network.parameters() = network.parameters();
+  }
 }
 
 }  // namespace tunnel_pilot::learning

@@ -9,6 +9,7 @@
 #include "tunnel_pilot/simulation/lidar_model.h"
 #include "tunnel_pilot/simulation/random.h"
 #include "tunnel_pilot/simulation/sensors.h"
+#include "tunnel_pilot/supervision/speed_governor.h"
 #include "tunnel_pilot/vehicle/articulation.h"
 #include "tunnel_pilot/world/world.h"
 
@@ -18,8 +19,8 @@ namespace {
 using simulation::Random;
 using simulation::Stream;
 
-constexpr double kStart = 8.0;   // sampled from here on ... [m]
-constexpr double kEnd = 30.0;    // ... to so far before an open line's end [m]
+constexpr double kStart = 8.0;  // sampled from here on ... [m]
+constexpr double kEnd = 30.0;   // ... to so far before an open line's end [m]
 
 // Mostly near, sometimes far: the cube of a uniform number has its heart at zero.
 double spreadOut(Random& random, double largest) {
@@ -41,6 +42,7 @@ class Sampler {
         lidar_(setup.simulator.lidar, seed),
         filter_(setup.pilot.perception.scan_filter),
         teacher_(setup.pilot.preview_driver, truck_),
+        governor_(setup.pilot.arbiter.governor),
         articulation_(setup.simulator.articulation, seed, Stream::kArticulation),
         speed_(setup.simulator.speed, seed, Stream::kSpeed),
         seed_(seed) {
@@ -57,7 +59,8 @@ class Sampler {
       for (int i = 0; i < kMoments && inside(truck); ++i) {
         std::optional<Example> example = look(truck, response);
         if (!example) break;
-        const double demand = static_cast<double>(example->label) + lean + spreadOut(random_, spread_.lean);
+        const double demand =
+            static_cast<double>(example->label) + lean + spreadOut(random_, spread_.lean);
         examples.push_back(std::move(*example));
         truck = teacher_.steered(line_, truck, response, demand, kMoment);
       }
@@ -77,7 +80,8 @@ class Sampler {
     truck.station = random_.uniform(line_.closed() ? 0.0 : kStart, last());
     truck.offset = spreadOut(random_, spread_.offset);
     truck.heading_error = spreadOut(random_, spread_.heading);
-    truck.speed = random_.uniform(spread_.speed_min, spread_.speed_max);
+    const double allowed = governor_.alongPath(profile_, truck.station).speed;
+    truck.speed = std::min(random_.uniform(spread_.speed_min, spread_.speed_max), allowed);
     truck.articulation = profile_.at(truck.station) + spreadOut(random_, spread_.articulation);
     return truck;
   }
@@ -133,6 +137,7 @@ class Sampler {
   perception::ScanFilter filter_;
   drivers::ArticulationProfile profile_;
   Teacher teacher_;
+  supervision::SpeedGovernor governor_;
   simulation::Sensor articulation_;
   simulation::Sensor speed_;
   std::uint64_t seed_;

@@ -15,14 +15,14 @@ constexpr double kMoveStep = 0.02;  // [s]
 
 drivers::TruckResponse response(const drivers::PreviewDriverParameters& p,
                                 const vehicle::TruckGeometry& geometry) {
-  return {geometry, p.truck.steering.lag, p.truck.steering.max_rate, std::min(p.truck.steering.max_articulation, geometry.max_articulation),
+  return {geometry, p.truck.steering.lag, p.truck.steering.max_rate,
+          std::min(p.truck.steering.max_articulation, geometry.max_articulation),
           p.truck.slip_compliance};
 }
 
 }  // namespace
 
-Teacher::Teacher(const drivers::PreviewDriverParameters& parameters,
-                 const vehicle::TruckGeometry& truck)
+Teacher::Teacher(const drivers::PreviewDriverParameters& parameters, const vehicle::TruckGeometry& truck)
     : parameters_(parameters),
       response_(response(parameters, truck)),
       planner_(response_, parameters.weights, parameters.step) {}

@@ -3,16 +3,20 @@
 #include <ros/console.h>
 
 #include <boost/make_shared.hpp>
+#include <filesystem>
 
+#include "tunnel_pilot/drivers/preview_laws.h"
 #include "tunnel_pilot/ros/parameters.h"
 
 namespace tunnel_pilot::shell {
 namespace {
 
-drivers::PreviewDriver makeDriver(const ros::NodeHandle& private_nh) {
+std::unique_ptr<drivers::PathDriver> makeDriver(const ros::NodeHandle& private_nh) {
   Parameters parameters(private_nh);
-  const auto truck = takeTruck(parameters);
-  return {drivers::loadPreviewDriver(parameters.rest()), truck.geometry};
+  const std::string truck_file = parameters.take({"truck_file"}).text("truck_file");
+  const std::string folder = std::filesystem::path(truck_file).parent_path().string();
+  return drivers::makePreviewDriver(drivers::loadPreviewDriver(parameters.rest(), folder),
+                                    vehicle::loadTruck(truck_file).geometry);
 }
 
 }  // namespace
@@ -47,7 +51,7 @@ void PreviewDriverRos::onJointState(const sensor_msgs::JointState& message) {
 void PreviewDriverRos::propose() {
   if (clock_.jumped()) {
     ROS_WARN("preview_driver: the clock jumped, starting anew");
-    driver_.reset();
+    driver_->reset();
     motion_.reset();
   }
   const auto tunnel = tunnel_.take();
@@ -58,7 +62,7 @@ void PreviewDriverRos::propose() {
     ROS_WARN_THROTTLE(1.0, "preview_driver: %s", problem_.c_str());
     return;
   }
-  const auto proposal = driver_.propose(*tunnel, *motion, nowAfter(toRos(motion->stamp)));
+  const auto proposal = driver_->propose(*tunnel, *motion, nowAfter(toRos(motion->stamp)));
   problem_ = proposal.valid ? "" : "no valid proposal: " + toString(tunnel->state.reason);
   publisher_.publish(boost::make_shared<Proposal>(toRos(proposal)));
 }

@@ -41,7 +41,7 @@ EpisodeResult runExperiment(const Scenario& scenario, const Setup& setup, const 
         } else if constexpr (std::is_same_v<Kind, SteadyTurnExperiment>) {
           return runSteadyTurn(experiment, scenario, setup, plan.seed);
         } else if constexpr (std::is_same_v<Kind, LaneChangeExperiment>) {
-          return runLaneChange(experiment, scenario, setup, plan.seed);
+          return runLaneChange(experiment, scenario, setup, plan.seed, observer);
         } else {
           return runPerception(experiment, setup, plan.seed, plan.reversed);
         }
@@ -80,10 +80,13 @@ Setup loadSetup(const Scenario& scenario) {
   Setup setup{vehicle::loadTruck(folder + "truck.yaml"),
               loadSimulator(config::loadFile(folder + "simulator.yaml")),
               loadTruckController(config::loadFile(folder + "truck_controller.yaml")),
-              loadPilot(scenario.config_folder),
+              loadPilot(scenario.config_folder, scenario.preview_law),
               {}};
   setup.fingerprints.scenario = sha256OfFiles({scenario.file});
-  setup.fingerprints.controller = sha256OfFiles(pilotFiles(scenario.config_folder));
+  std::vector<std::string> controller = pilotFiles(scenario.config_folder);
+  const drivers::PreviewDriverParameters& preview = setup.pilot.preview_driver;
+  if (preview.law == drivers::PreviewLaw::kNetwork) controller.push_back(preview.network_law.file);
+  setup.fingerprints.controller = sha256OfFiles(controller);
   setup.fingerprints.plant = sha256OfFiles(
       {folder + "truck.yaml", folder + "simulator.yaml", folder + "truck_controller.yaml"});
   const std::string world = worldOf(scenario.experiment);

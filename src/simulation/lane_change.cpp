@@ -43,10 +43,11 @@ geometry::PathPoint prolongedAt(const geometry::Path& path, double s) {
 class LaneChange : public ClosedLoop {
  public:
   LaneChange(const LaneChangeExperiment& change, const Scenario& scenario, const Setup& setup,
-             std::uint64_t seed)
+             std::uint64_t seed, DriveObserver* observer)
       : ClosedLoop(scenario, setup, withFixedSpeed(setup.pilot, change.speed), openGround(change), seed),
         change_(change),
-        noise_(seed, Stream::kSensedPath) {}
+        noise_(seed, Stream::kSensedPath),
+        observer_(observer) {}
 
   EpisodeResult run() {
     EpisodeResult result;
@@ -70,6 +71,7 @@ class LaneChange : public ClosedLoop {
  private:
   void takeScan(const geometry::Scan& scan) override {
     pilot_.takeTunnel(sensed(simulator_.truthOfScan(), scan.stamp), simulator_.now());
+    if (driving_ && observer_ != nullptr) observer_->afterScan(simulator_, pilot_);
   }
 
   // The path as a sensor tells it that sees the whole of it, wrong by one shift and one turn each time.
@@ -110,13 +112,14 @@ class LaneChange : public ClosedLoop {
 
   LaneChangeExperiment change_;
   Random noise_;
+  DriveObserver* observer_;
 };
 
 }  // namespace
 
 EpisodeResult runLaneChange(const LaneChangeExperiment& change, const Scenario& scenario,
-                            const Setup& setup, std::uint64_t seed) {
-  return LaneChange(change, scenario, setup, seed).run();
+                            const Setup& setup, std::uint64_t seed, DriveObserver* observer) {
+  return LaneChange(change, scenario, setup, seed, observer).run();
 }
 
 }  // namespace tunnel_pilot::simulation

@@ -1,5 +1,7 @@
 #include "tunnel_pilot/simulation/pilot.h"
 
+#include "tunnel_pilot/drivers/preview_laws.h"
+
 namespace tunnel_pilot::simulation {
 namespace {
 
@@ -27,15 +29,16 @@ std::vector<std::string> pilotFiles(const std::string& config_folder) {
   return files;
 }
 
-PilotParameters loadPilot(const std::string& config_folder) {
+PilotParameters loadPilot(const std::string& config_folder, std::optional<drivers::PreviewLaw> law) {
   const std::string folder = config_folder + "/";
-  return {DriverChoice::kPreviewDriver,
-          loadPerception(perceptionFiles(config_folder)),
-          drivers::loadPreviewDriver(config::loadFile(folder + "preview_driver.yaml")),
-          drivers::loadLidarDriver(config::loadFile(folder + "lidar_driver.yaml"), config_folder),
-          nullptr,
-          supervision::loadArbiter(config::loadFile(folder + "arbiter.yaml")),
-          bridge::loadBridge(config::loadFile(folder + "can_bridge.yaml"))};
+  return {
+      DriverChoice::kPreviewDriver,
+      loadPerception(perceptionFiles(config_folder)),
+      drivers::loadPreviewDriver(config::loadFile(folder + "preview_driver.yaml"), config_folder, law),
+      drivers::loadLidarDriver(config::loadFile(folder + "lidar_driver.yaml"), config_folder),
+      nullptr,
+      supervision::loadArbiter(config::loadFile(folder + "arbiter.yaml")),
+      bridge::loadBridge(config::loadFile(folder + "can_bridge.yaml"))};
 }
 
 Pilot::Pilot(const PilotParameters& parameters, const vehicle::TruckParameters& truck, can::Bus& bus)
@@ -44,7 +47,7 @@ Pilot::Pilot(const PilotParameters& parameters, const vehicle::TruckParameters& 
       arbiter_(parameters.arbiter, truck),
       bridge_(parameters.bridge, truck.geometry, bus) {
   if (parameters.driver != DriverChoice::kLidarDriver) {
-    preview_driver_.emplace(parameters.preview_driver, truck.geometry);
+    preview_driver_ = drivers::makePreviewDriver(parameters.preview_driver, truck.geometry);
   }
   if (parameters.driver != DriverChoice::kPreviewDriver) {
     lidar_driver_.emplace(parameters.lidar_driver, truck.geometry, *parameters.network);

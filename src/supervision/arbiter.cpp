@@ -265,12 +265,16 @@ void Arbiter::assessSources(Stamp now, Findings& findings) const {
   if (!excused) findings.stopFor(causes.stop);
 }
 
-// A source that would steer, were it sure, sees something that others may not see as well: slowly.
+// A source that would steer, were it sure, sees something that others may not see as well: slowly. One
+// that must be sure of its proposals and makes none is not sure either.
 void Arbiter::assessConfidence(Stamp now, Findings& findings) const {
   const SourceRule* best = bestSource(now);
   for (const SourceRule& rule : parameters_.sources) {
     const bool before_best = rule.steers && (!best || rule.priority > best->priority);
-    if (before_best && health(rule, now) == Health::kUnsure) findings.slowFor(Reason::kLowConfidence);
+    const Health state = health(rule, now);
+    const bool unsure =
+        state == Health::kUnsure || (state == Health::kUnable && rule.min_confidence > 0.0);
+    if (before_best && unsure) findings.slowFor(Reason::kLowConfidence);
   }
   if (disagree_since_ && age(disagree_since_, now) >= parameters_.disagreement_time) {
     findings.slowFor(Reason::kDriversDisagree);

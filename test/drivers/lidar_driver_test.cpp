@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <random>
 
 #include "random_network.h"
+#include "tunnel_pilot/drivers/inverse_ranges.h"
 #include "tunnel_pilot/perception/scan_filter.h"
 
 namespace tunnel_pilot::neural {
@@ -129,6 +131,58 @@ TEST(LidarDriver, ANetworkForOtherInputsOrOutputsIsRefused) {
   EXPECT_THROW(driverOf(network), config::ConfigError);
   network = randomNetwork();
   network.output.meaning = "speed";
+  EXPECT_THROW(driverOf(network), config::ConfigError);
+}
+
+// ---- scans unlike those of the training (RELIABILITY N3)
+
+// A domain in which a scan of `centre` lies in the middle and every feature may vary by about a tenth.
+neural::InputDomain domainAround(const geometry::Scan& centre) {
+  std::vector<float> inverse;
+  EXPECT_TRUE(invertRanges(centre.ranges, inverse));
+  const ScanDomain::Features middle = ScanDomain::features(inverse);
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal(0.0, 0.1);
+  std::vector<ScanDomain::Features> examples(2000, middle);
+  for (ScanDomain::Features& example : examples) {
+    for (double& feature : example) feature += normal(random);
+  }
+  return ScanDomain::fit(examples);
+}
+
+Proposal proposeForeignAt(LidarDriver& driver, double time) {
+  geometry::Scan foreign = nativeScan(time);
+  for (float& range : foreign.ranges) range *= 3.0F;
+  return driver.propose(foreign, motionAt(time + 0.03), fromSeconds(time + 0.04));
+}
+
+TEST(LidarDriver, IsAsSureOfAFamiliarScanAsWithoutADomainAndLessOfAForeignOne) {
+  neural::NetworkFile network = randomNetwork();
+  LidarDriver without = driverOf(network);
+  network.domain = domainAround(nativeScan(1.0));
+  LidarDriver with = driverOf(network);
+  EXPECT_EQ(proposeAt(with, 1.0).confidence, proposeAt(without, 1.0).confidence);
+  const double later = 1.1 + parameters().bridge_time;
+  const Proposal proposal = proposeForeignAt(with, later);
+  EXPECT_TRUE(proposal.valid);
+  EXPECT_LT(proposal.confidence, 0.25 * proposeForeignAt(without, later).confidence);
+}
+
+TEST(LidarDriver, AForeignScanIsBridgedForAMomentWithTheLastSureAnswer) {
+  neural::NetworkFile network = randomNetwork();
+  network.domain = domainAround(nativeScan(1.0));
+  LidarDriver driver = driverOf(network);
+  const Proposal sure = proposeAt(driver, 1.0);
+  ASSERT_GT(sure.confidence, parameters().sure);
+  const double last = 0.99 * parameters().bridge_time;
+  EXPECT_EQ(proposeForeignAt(driver, 1.0 + last).confidence, sure.confidence);
+  EXPECT_LT(proposeForeignAt(driver, 1.01 + parameters().bridge_time).confidence, sure.confidence);
+}
+
+TEST(LidarDriver, ANetworkWithADomainOfOtherFeaturesIsRefused) {
+  neural::NetworkFile network = randomNetwork();
+  network.domain = domainAround(nativeScan(1.0));
+  network.domain->meaning = "other";
   EXPECT_THROW(driverOf(network), config::ConfigError);
 }
 

@@ -17,7 +17,7 @@ SensedPathDrive::Result drive(const SensedPathDrive& setup,
   vehicle::DynamicTruckOptions options;
   options.road_seed = setup.seed;
   vehicle::DynamicTruck plant(plant_truck, options);
-  PreviewDriver driver(loadPreviewDriver(config::loadFile(kConfig + "preview_driver.yaml")),
+  PreviewDriver driver(loadPreviewDriver(config::loadFile(kConfig + "preview_driver.yaml"), kConfig),
                        truck().geometry);
   return setup.run(plant, driver);
 }

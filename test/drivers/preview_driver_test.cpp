@@ -12,7 +12,7 @@ const std::string kConfig = std::string(TUNNEL_PILOT_SOURCE_DIR) + "/config/";
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 PreviewDriverParameters parameters() {
-  return loadPreviewDriver(config::loadFile(kConfig + "preview_driver.yaml"));
+  return loadPreviewDriver(config::loadFile(kConfig + "preview_driver.yaml"), kConfig);
 }
 
 PreviewDriver driver() { return {parameters(), vehicle::loadTruck(kConfig + "truck.yaml").geometry}; }
@@ -79,6 +79,15 @@ TEST(PreviewDriver, ProposesNothingFromNumbersThatAreNone) {
   EXPECT_FALSE(driver().propose(tunnelAt(1.0), motion, fromSeconds(1.05)).valid);
 }
 
+TEST(PreviewDriver, SteersATruckWithoutAnyDelayToo) {
+  PreviewDriverParameters p = parameters();
+  p.truck.steering.dead_time = 0.0;
+  p.truck.steering.transport_delay = 0.0;
+  PreviewDriver d(p, vehicle::loadTruck(kConfig + "truck.yaml").geometry);
+  const Proposal proposal = d.propose(tunnelAt(1.0, 0.5), motionAt(1.0), fromSeconds(1.0));
+  EXPECT_TRUE(std::isfinite(proposal.articulation_angle));
+}
+
 TEST(PreviewDriver, StartsFromTheMeasuredArticulation) {
   const Proposal proposal = driver().propose(tunnelAt(1.0), motionAt(1.03, 0.2), fromSeconds(1.05));
   EXPECT_NEAR(proposal.articulation_angle, 0.2, 1e-9);
@@ -94,8 +103,9 @@ TEST(PreviewDriver, ItsCommandNeverMovesFasterThanTheSteering) {
         d.propose(tunnelAt(time, offset), motionAt(time + 0.03, last), fromSeconds(time + 0.05));
     ASSERT_TRUE(proposal.valid);
     if (i > 0) {
-      EXPECT_LE(std::abs(proposal.articulation_angle - last),
-                parameters().truck.steering.max_rate * 0.03 + parameters().truck.steering.dead_band + 1e-9);
+      EXPECT_LE(
+          std::abs(proposal.articulation_angle - last),
+          parameters().truck.steering.max_rate * 0.03 + parameters().truck.steering.dead_band + 1e-9);
     }
     last = proposal.articulation_angle;
   }
@@ -108,7 +118,8 @@ TEST(PreviewDriver, StaysNearTheArticulationWhileSomeoneElseSteers) {
     const Proposal proposal =
         d.propose(tunnelAt(time, 1.0), motionAt(time + 0.03, 0.3), fromSeconds(time + 0.05));
     EXPECT_NEAR(proposal.articulation_angle, 0.3,
-                2.0 * parameters().truck.steering.lead + parameters().truck.steering.max_bias + parameters().truck.steering.dead_band);
+                2.0 * parameters().truck.steering.lead + parameters().truck.steering.max_bias +
+                    parameters().truck.steering.dead_band);
   }
 }
 
@@ -161,7 +172,7 @@ TEST(PreviewDriverParameters, OutOfRangeIsRefusedByName) {
   YAML::Node yaml = YAML::LoadFile(kConfig + "preview_driver.yaml");
   yaml["steering"]["dead_time"] = -0.1;
   try {
-    loadPreviewDriver(config::Node(yaml, "preview_driver.yaml"));
+    loadPreviewDriver(config::Node(yaml, "preview_driver.yaml"), kConfig);
     FAIL() << "not refused";
   } catch (const config::ConfigError& e) {
     EXPECT_NE(std::string(e.what()).find("steering.dead_time"), std::string::npos) << e.what();
@@ -171,7 +182,8 @@ TEST(PreviewDriverParameters, OutOfRangeIsRefusedByName) {
 TEST(PreviewDriverParameters, UnknownKeyIsRefused) {
   YAML::Node yaml = YAML::LoadFile(kConfig + "preview_driver.yaml");
   yaml["sped"] = 3.0;
-  EXPECT_THROW(loadPreviewDriver(config::Node(yaml, "preview_driver.yaml")), config::ConfigError);
+  EXPECT_THROW(loadPreviewDriver(config::Node(yaml, "preview_driver.yaml"), kConfig),
+               config::ConfigError);
 }
 
 }  // namespace

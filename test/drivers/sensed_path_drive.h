@@ -34,10 +34,10 @@ struct SensedPathDrive {
     double overshoot = 0.0;     // beyond the path, seen from the start [m]
   };
 
-  Result run(vehicle::Plant& plant, PreviewDriver& driver) const;
+  Result run(vehicle::Plant& plant, PathDriver& driver) const;
 };
 
-inline SensedPathDrive::Result SensedPathDrive::run(vehicle::Plant& plant, PreviewDriver& driver) const {
+inline SensedPathDrive::Result SensedPathDrive::run(vehicle::Plant& plant, PathDriver& driver) const {
   constexpr double kStep = 0.001;
   std::mt19937 engine(seed);
   std::normal_distribution<double> normal;

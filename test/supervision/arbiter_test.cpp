@@ -191,6 +191,21 @@ TEST(Arbiter, AnUnsureSourceIsDroppedForTheNextWhichDrivesSlowly) {
   }
 }
 
+TEST(Arbiter, ASourceThatMustBeSureAndProposesNothingIsUnsure) {
+  ArbiterBench bench;
+  bench.drive();
+  drivers::Proposal none = bench.proposal();
+  none.valid = false;
+  bench.arbiter->setProposal(Source::kTeleoperation, none, bench.now);
+  EXPECT_FALSE(bench.cycle().degraded) << "an operator who does not steer";
+  none.stamp = bench.now - bench.latency;
+  bench.arbiter->setProposal(Source::kLidarDriver, none, bench.now);
+  const Decision& decision = bench.cycle();
+  EXPECT_TRUE(decision.degraded);
+  EXPECT_EQ(decision.command.source, Source::kPreviewDriver);
+  EXPECT_EQ(decision.command.reason, Reason::kLowConfidence);
+}
+
 TEST(Arbiter, ASourceThatIsSureAgainSteersAtOnceAndDrivesFastAfterASecond) {
   ArbiterBench bench;
   bench.drive();

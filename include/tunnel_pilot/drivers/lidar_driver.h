@@ -71,10 +71,10 @@ class LidarInputs {
   TruckInputs truck_;
 };
 
-/// Steers by a network from the scan to the articulation (paper 000: 761-5-31 and its successors). A scan
-/// that the network is not sure of (a cloud of dust before the lidar) is bridged for a moment with the
-/// last sure answer. The confidence of its proposals is that of the decoded outputs, lowered for scans unlike those of the
-/// training where the network's file tells their domain (ScanDomain).
+/// Steers by a network from the scan to the articulation (paper 000: 761-5-31 and its successors). A
+/// scan that the network is not sure of (a cloud of dust before the lidar) is bridged for a moment with
+/// the last sure answer. The confidence of its proposals is that of the decoded outputs, lowered for
+/// scans unlike those of the training where the network's file tells their domain (ScanDomain).
 class LidarDriver {
  public:
   /// Why the last proposal is not valid.
@@ -104,8 +104,8 @@ class LidarDriver {
   const std::vector<float>& outputs() const { return outputs_; }  ///< of the last scan
   /// What the outputs stand for; none for a network with the articulation as its only output.
   const std::optional<neural::GaussianCode>& code() const { return code_; }
-  const TruckInputs& truckInputs() const { return truck_; }       ///< at the last scan
-  const std::string& model() const { return model_; }             ///< name and hash
+  const TruckInputs& truckInputs() const { return truck_; }  ///< at the last scan
+  const std::string& model() const { return model_; }        ///< name and hash
 
  private:
   friend struct LidarDriverAccess;  // a test that spoils parameters

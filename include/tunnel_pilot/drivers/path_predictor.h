@@ -13,10 +13,10 @@ namespace tunnel_pilot::drivers {
 
 /// What a driver along a path believes of the truck, and how it filters what it is told.
 struct PathPredictorParameters {
-  double max_tunnel_age;    ///< an older tunnel is not driven on [s]
-  double slip_compliance;   ///< tyre slip angle per lateral acceleration [rad s^2/m]
-  double offset_time;       ///< memory of the offset filter [s]
-  double heading_time;      ///< memory of the heading filter [s]
+  double max_tunnel_age;   ///< an older tunnel is not driven on [s]
+  double slip_compliance;  ///< tyre slip angle per lateral acceleration [rad s^2/m]
+  double offset_time;      ///< memory of the offset filter [s]
+  double heading_time;     ///< memory of the heading filter [s]
   SteeringEstimatorParameters steering;
 };
 

@@ -52,9 +52,9 @@ class SteeringEstimator {
   double commandActing(Stamp time) const { return commandGivenBefore(time - delay()); }
   double newestCommand() const { return given_[newest_].command; }
 
-  /// Takes the command that a driver has found, held within `lead` of the articulation `meets` [rad] that
-  /// it will meet, so that a driver takes over from where the truck stands while another one steers.
-  /// Returns what to send: the command and what crosses the valve's dead band [rad].
+  /// Takes the command that a driver has found, held within `lead` of the articulation `meets` [rad]
+  /// that it will meet, so that a driver takes over from where the truck stands while another one
+  /// steers. Returns what to send: the command and what crosses the valve's dead band [rad].
   double give(double command, double meets, Stamp now);
 
   /// Time since the last command, no more than a pause that it can bridge; 0 before the first one [s].

@@ -13,14 +13,14 @@ namespace tunnel_pilot::drivers {
 /// Runs a network and watches over it, for a network may be wrong, but must not be silently so:
 /// - every kCheckPeriod it is given the golden input that it was given when it was made, and must answer
 ///   with the same bits. When it does not, its parameters were spoilt in memory: it never runs again.
-/// - outputs that are not finite or beyond what a code's probabilities may be are refused; after
-///   kMostRefused of the last kRemembered it gives up until reset().
+/// - outputs that are not finite or of a magnitude beyond kLargestOutput are refused (probabilities are
+///   at most 1, scaled values hardly more); after kMostRefused of the last kRemembered runs it gives up
+///   until reset().
 /// Allocates nothing after construction.
 class WatchedInference {
  public:
   static constexpr Stamp kCheckPeriod = std::chrono::seconds(60);
-  static constexpr float kLeastOutput = -1.0F;
-  static constexpr float kHighestOutput = 2.0F;
+  static constexpr float kLargestOutput = 2.0F;
   static constexpr std::size_t kRemembered = 10;
   static constexpr std::size_t kMostRefused = 3;
 

@@ -10,14 +10,14 @@ namespace tunnel_pilot::learning {
 
 /// One moment of a drive: what the driver saw, and the articulation it should demand.
 struct Example {
-  std::vector<float> ranges;         ///< the filter's network scan [m]
-  float articulation = 0.0F;         ///< when the driver saw the scan [rad]
-  float articulation_ahead = 0.0F;   ///< when a command given then begins to act [rad]
-  float speed = 0.0F;                ///< measured [m/s]
-  float yaw_gain = 1.0F;             ///< g [1]
-  float yaw_disturbance = 0.0F;      ///< d [1/m]
-  float label = 0.0F;                ///< articulation to demand [rad]
-  std::uint32_t tunnel = 0;          ///< it was driven in: examples of one tunnel stay together
+  std::vector<float> ranges;        ///< the filter's network scan [m]
+  float articulation = 0.0F;        ///< when the driver saw the scan [rad]
+  float articulation_ahead = 0.0F;  ///< when a command given then begins to act [rad]
+  float speed = 0.0F;               ///< measured [m/s]
+  float yaw_gain = 1.0F;            ///< g [1]
+  float yaw_disturbance = 0.0F;     ///< d [1/m]
+  float label = 0.0F;               ///< articulation to demand [rad]
+  std::uint32_t tunnel = 0;         ///< it was driven in: examples of one tunnel stay together
 };
 
 inline drivers::TruckInputs truckInputsOf(const Example& example) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 
@@ -10,24 +11,27 @@ namespace tunnel_pilot::learning {
 
 struct TrainingOptions {
   int epochs = 20;
-  double rate = 1e-3;        ///< Adam's, falls along a cosine to a hundredth of it
-  double weight_decay = 0.0;
-  double decode_weight = 0.0;  ///< of the squared error of the decoded angle, in spacings
-  bool mirror = true;        ///< show every example mirrored as often as not
-  std::size_t components = 100;  ///< principal components trained on; 0: the raw inputs
+  int patience = 100;            ///< epochs without a lower error on the held-out tunnels, then it stops
+  double rate = 1e-3;            ///< Adam's; falls along a cosine to a hundredth of it
+  double weight_decay = 0.0;     ///< a step and rate [1]
+  std::size_t components = 120;  ///< principal components that a dense first layer is trained on; 0: raw
   std::uint64_t seed = 1;
-  int threads = 2;
 };
 
 struct TrainingProgress {
   int epoch;               ///< from 1
-  double loss;             ///< mean of the epoch
-  double validation_loss;
-  double validation_rms;   ///< of the decoded angle [rad]
+  double loss;             ///< mean over the epoch [1]
+  double validation_loss;  ///< [1]
+  double validation_rms;   ///< of the angle that the outputs tell [rad]
 };
 
-/// Trains a lidar driver's network. Keeps the parameters of the epoch with the least validation error.
-/// Throws std::runtime_error when the loss is no longer finite; the network is then as it was.
+/// Trains the network of a lidar driver from its present parameters, or from new random ones where the
+/// first layer is trained on principal components (InputProjection). Every example is shown as often
+/// mirrored as not. Loss: cross-entropy on the Gaussian code's probabilities (crossEntropy), or half the
+/// squared error of a single output. Two threads, with the same result on any machine. Keeps the
+/// parameters of the epoch with the least error on `validation`, examples from tunnels held out.
+/// Throws std::invalid_argument without examples, neural::Diverged when something is no longer finite;
+/// the network is then as it was.
 void trainNetwork(neural::NetworkFile& file, const DataSet& examples, const DataSet& validation,
                   const TrainingOptions& options,
                   const std::function<void(const TrainingProgress&)>& progress);

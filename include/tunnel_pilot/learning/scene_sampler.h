@@ -13,10 +13,10 @@ namespace tunnel_pilot::learning {
 
 /// How far the sampled trucks stand from where they should be.
 struct SceneSpread {
-  double offset = 0.7;          ///< [m] largest
-  double heading = 0.25;        ///< [rad] largest
-  double articulation = 0.2;    ///< [rad] largest
-  double lean = 0.04;           ///< of the demand on the way on from there [rad] largest
+  double offset = 0.7;                      ///< [m] largest
+  double heading = 0.25;                    ///< [rad] largest
+  double articulation = 0.2;                ///< [rad] largest
+  double lean = 0.04;                       ///< of the demand on the way on from there [rad] largest
   double speed_min = 2.0, speed_max = 3.2;  ///< [m/s]
   double gain_min = 0.7, gain_max = 1.25;   ///< yaw gain g [1]
   double disturbance = 0.006;               ///< d, largest [1/m]

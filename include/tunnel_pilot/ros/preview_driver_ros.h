@@ -2,9 +2,10 @@
 
 #include <ros/node_handle.h>
 
+#include <memory>
 #include <string>
 
-#include "tunnel_pilot/drivers/preview_driver.h"
+#include "tunnel_pilot/drivers/driver.h"
 #include "tunnel_pilot/ros/clock_watch.h"
 #include "tunnel_pilot/ros/conversions.h"
 #include "tunnel_pilot/ros/diagnostics.h"
@@ -12,10 +13,11 @@
 
 namespace tunnel_pilot::shell {
 
-/// Shell of drivers::PreviewDriver. Subscribes `tunnel_state` and `centerline` (paired by stamp),
-/// `odom`, `joint_states`; publishes `preview_driver/proposal` (tunnel_pilot/Proposal) for every tunnel
-/// once the truck's motion is known. Parameters: config/preview_driver.yaml and `truck_file` (path of
-/// the truck's YAML). Throws config::ConfigError.
+/// Shell of drivers::PreviewDriver or NeuralPreviewDriver, as the parameter `law` says. Subscribes
+/// `tunnel_state` and `centerline` (paired by stamp), `odom`, `joint_states`; publishes
+/// `preview_driver/proposal` (tunnel_pilot/Proposal) for every tunnel once the truck's motion is known.
+/// Parameters: config/preview_driver.yaml and `truck_file` (path of the truck's YAML; a relative name of
+/// the network's file is looked for from its folder). Throws config::ConfigError.
 class PreviewDriverRos {
  public:
   PreviewDriverRos(ros::NodeHandle nh, ros::NodeHandle private_nh);
@@ -28,7 +30,7 @@ class PreviewDriverRos {
   void propose();
   void fillStatus(Diagnostics::Status& status) const;
 
-  drivers::PreviewDriver driver_;
+  std::unique_ptr<drivers::PathDriver> driver_;
   ClockWatch clock_;
   TunnelInput tunnel_;
   MotionInput motion_;

@@ -49,11 +49,11 @@ class DriveObserver {
  public:
   virtual ~DriveObserver() = default;
   virtual void afterScan(const Simulator& simulator, const Pilot& pilot) = 0;  ///< pilot has answered it
-  virtual void afterTruth(const Simulator& simulator) = 0;                     ///< truth() is new
+  virtual void afterTruth(const Simulator& simulator) = 0;  ///< truth() is new; drives only
 };
 
-/// Runs one episode; a drive tells its observer. Depends on its arguments alone. Throws config::ConfigError when the scenario's
-/// world cannot be read.
+/// Runs one episode; drives and lane changes tell their observer. Depends on its arguments alone. Throws
+/// config::ConfigError when the scenario's world cannot be read.
 EpisodeResult runEpisode(const Scenario& scenario, const Setup& setup, const EpisodePlan& plan,
                          DriveObserver* observer = nullptr);
 

@@ -8,7 +8,7 @@
 #include "tunnel_pilot/bridge/can_bridge.h"
 #include "tunnel_pilot/drivers/lidar_driver.h"
 #include "tunnel_pilot/drivers/motion_history.h"
-#include "tunnel_pilot/drivers/preview_driver.h"
+#include "tunnel_pilot/drivers/preview_parameters.h"
 #include "tunnel_pilot/simulation/perception_chain.h"
 #include "tunnel_pilot/supervision/arbiter.h"
 
@@ -33,8 +33,9 @@ struct PilotParameters {
 /// The files that make up PilotParameters.
 std::vector<std::string> pilotFiles(const std::string& config_folder);
 
-/// Throws config::ConfigError.
-PilotParameters loadPilot(const std::string& config_folder);
+/// A preview law given here takes the place of the folder's. Throws config::ConfigError.
+PilotParameters loadPilot(const std::string& config_folder,
+                          std::optional<drivers::PreviewLaw> law = std::nullopt);
 
 /// The whole pilot without ROS: the same classes that the nodelets wrap, called in the order in which
 /// their messages come. Deterministic: time is an argument, and the bus is given.
@@ -58,6 +59,7 @@ class Pilot {
   const supervision::Decision& decision() const { return decision_; }
   const perception::Tunnel& tunnel() const { return tunnel_; }
   const PerceptionChain& perception() const { return perception_; }
+  const drivers::PathDriver* previewDriver() const { return preview_driver_.get(); }  ///< or none
   const drivers::Proposal& previewProposal() const { return preview_proposal_; }
   const drivers::Proposal& lidarProposal() const { return lidar_proposal_; }
   const std::optional<drivers::LidarDriver>& lidarDriver() const { return lidar_driver_; }
@@ -69,7 +71,7 @@ class Pilot {
 
   geometry::Pose sensor_in_base_;
   PerceptionChain perception_;
-  std::optional<drivers::PreviewDriver> preview_driver_;
+  std::unique_ptr<drivers::PathDriver> preview_driver_;
   std::optional<drivers::LidarDriver> lidar_driver_;
   supervision::Arbiter arbiter_;
   bridge::CanBridge bridge_;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tunnel_pilot/config/node.h"
+#include "tunnel_pilot/drivers/preview_parameters.h"
 #include "tunnel_pilot/geometry/path.h"
 #include "tunnel_pilot/vehicle/truck_parameters.h"
 
@@ -89,8 +90,9 @@ struct Goal {
 struct Scenario {
   std::string name;
   std::string title;
-  std::string file;           ///< it was read from
-  std::string config_folder;  ///< the rooms' YAML files
+  std::string file;                                ///< it was read from
+  std::string config_folder;                       ///< the rooms' YAML files
+  std::optional<drivers::PreviewLaw> preview_law;  ///< none: what preview_driver.yaml says
   std::uint64_t first_seed;
   int seeds;
   PlantChoice plant;
