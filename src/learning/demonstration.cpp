@@ -185,31 +185,32 @@ std::optional<Lesson> Demonstration::lessonOf(Pending& pending) const {
   if (!now || !ahead || !label) return std::nullopt;
   if (!(std::min(now->motion.speed, label->motion.speed) >= parameters_.least_speed))
     return std::nullopt;
-  Lesson lesson{std::move(pending.example), {}};
+  Lesson lesson{std::move(pending.example), {}, 0.0F};
   lesson.example.articulation = static_cast<float>(now->motion.articulation);
   lesson.example.articulation_ahead = static_cast<float>(ahead->motion.articulation);
   lesson.example.speed = static_cast<float>(now->motion.speed);
   lesson.example.yaw_gain = static_cast<float>(now->yaw.gain);
   lesson.example.yaw_disturbance = static_cast<float>(now->yaw.disturbance);
   lesson.example.label = static_cast<float>(label->motion.articulation);
-  lesson.correction = correctionOf(pending.stamp, now->motion.speed);
+  correct(pending.stamp, lesson);
   return lesson;
 }
 
-std::optional<float> Demonstration::correctionOf(Stamp scan, double speed) const {
+void Demonstration::correct(Stamp scan, Lesson& lesson) const {
   const Stamp acts = scan + fromSeconds(parameters_.seen_after + parameters_.acts_after);
   const std::optional<Deviation> at_label = deviationAt(scan + fromSeconds(parameters_.label_after));
   const std::optional<Deviation> at_act = deviationAt(acts);
   const double settled = kSettlingWays * truck_.rear_axle_to_hinge;
-  if (!at_label || !at_act || at_act->way < settled) return std::nullopt;
+  if (!at_label || !at_act || at_act->way < settled) return;
   const double arm = truck_.front_axle_to_hinge + truck_.rear_axle_to_hinge;
-  const double lambda = speed * parameters_.lag;
+  const double lambda = static_cast<double>(lesson.example.speed) * parameters_.lag;
   const double k_e = arm * lambda / (kReturn * kReturn * kReturn);
   const double k_eta = 3.0 * arm * lambda / (kReturn * kReturn) - truck_.rear_axle_to_hinge * k_e;
   const double k_g = 3.0 * lambda / kReturn - 1.0;
   const double eta = at_act->course - truck_.rear_axle_to_hinge / arm * at_act->articulation;
   const double back = -k_e * at_act->offset - k_eta * eta - k_g * at_act->articulation;
-  return static_cast<float>(back - at_label->articulation);
+  lesson.correction = static_cast<float>(back - at_label->articulation);
+  lesson.offset = static_cast<float>(at_act->offset);
 }
 
 void Demonstration::forgetOld() {

@@ -1,15 +1,15 @@
 #include "tunnel_pilot/learning/human_drives.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <exception>
+#include <cstdio>
+#include <iterator>
+#include <map>
 #include <memory>
-#include <mutex>
 #include <stdexcept>
-#include <thread>
 #include <utility>
 
+#include "in_parallel.h"
 #include "tunnel_pilot/bridge/can_bridge.h"
 #include "tunnel_pilot/can/memory_bus.h"
 #include "tunnel_pilot/drivers/motion_history.h"
@@ -172,14 +172,108 @@ HumanDrive driveAsHuman(const simulation::Scenario& scenario, const simulation::
   return Recording(*drive, scenario, setup, plan, habit, keep_every).run();
 }
 
+namespace {
+
+constexpr double kBin = 0.1;          // [m]
+constexpr float kInBend = 0.05F;      // articulation that tells a bend [rad]
+constexpr double kLeastShare = 0.15;  // of lessons far inside that stay: they teach to come back
+
+// Offset to the inside of the bend, in bins; on straights all are in the middle one.
+int binOf(const Lesson& lesson) {
+  if (std::abs(lesson.example.label) < kInBend) return 0;
+  const float inside = std::copysign(1.0F, lesson.example.label) * lesson.offset;
+  return static_cast<int>(std::lround(static_cast<double>(inside) / kBin));
+}
+
+}  // namespace
+
 DataSet examplesOf(const std::vector<Lesson>& lessons, bool corrected) {
   DataSet examples;
+  if (!corrected) {
+    for (const Lesson& lesson : lessons) examples.push_back(lesson.example);
+    return examples;
+  }
+  std::map<int, double> count, credit;
   for (const Lesson& lesson : lessons) {
-    if (corrected && !lesson.correction) continue;
+    if (lesson.correction) count[binOf(lesson)] += 1.0;
+  }
+  for (const Lesson& lesson : lessons) {
+    if (!lesson.correction) continue;
+    const int bin = binOf(lesson);
+    const double share = std::max(count[-bin] / count[bin], kLeastShare);
+    credit[bin] += std::min(1.0, share);
+    if (credit[bin] < 1.0) continue;
+    credit[bin] -= 1.0;
     examples.push_back(lesson.example);
-    if (corrected) examples.back().label += *lesson.correction;
+    examples.back().label += *lesson.correction;
   }
   return examples;
+}
+
+double InsideReport::mean() const {
+  double sum = 0.0;
+  for (const double value : inside) sum += value;
+  return inside.empty() ? 0.0 : sum / static_cast<double>(inside.size());
+}
+
+namespace {
+
+constexpr double kDegrees = 57.29577951308232;
+
+InsideReport letDrive(const simulation::Scenario& scenario, simulation::Setup setup,
+                      const neural::NetworkFile& network, int seeds, int jobs) {
+  setup.pilot.driver = simulation::DriverChoice::kLidarDriver;
+  setup.pilot.network = std::make_shared<neural::NetworkFile>(network);
+  InsideReport report;
+  const auto plans = simulation::episodePlans(scenario, seeds);
+  for (const auto& result : simulation::runEpisodes(scenario, setup, plans, jobs, [](std::size_t) {})) {
+    report.completed += result.metrics.at("completed") > 0.0 ? 1 : 0;
+    const auto inside = result.metrics.find("inside_mean");
+    if (inside != result.metrics.end()) report.inside.push_back(inside->second);
+  }
+  return report;
+}
+
+std::string told(const char* who, const InsideReport& report) {
+  char line[160];
+  std::snprintf(line, sizeof line, "%s: %.1f mm inside of bends, %d of %zu drives completed", who,
+                1e3 * report.mean(), report.completed, report.inside.size());
+  return line;
+}
+
+}  // namespace
+
+HumanReport humanExperiment(const simulation::Scenario& scenario, const simulation::Setup& setup,
+                            const HumanOptions& options, const Recipe& recipe, int jobs,
+                            const std::function<void(const std::string&)>& tell) {
+  simulation::Scenario his = scenario;
+  his.first_seed = options.first_seed;
+  const auto plans = simulation::episodePlans(his, options.tunnels);
+  std::vector<HumanDrive> drives(plans.size());
+  inParallel(plans.size(), jobs, [&](std::size_t i) {
+    drives[i] = driveAsHuman(scenario, setup, plans[i], options.habit, options.keep_every);
+  });
+  HumanReport report;
+  std::vector<Lesson> lessons;
+  for (HumanDrive& drive : drives) {
+    report.human.inside.push_back(drive.metrics.at("inside_mean"));
+    report.human.completed += drive.metrics.at("contacts") > 0.0 ? 0 : 1;
+    report.human_heading += drive.inside_heading / static_cast<double>(drives.size());
+    std::move(drive.lessons.begin(), drive.lessons.end(), std::back_inserter(lessons));
+  }
+  tell(told("human", report.human) + ", heading " + std::to_string(kDegrees * report.human_heading) +
+       " deg");
+  const auto taught = [&](bool corrected) {
+    const DataSet data = examplesOf(lessons, corrected);
+    return follow(recipe, &data, jobs, tell);
+  };
+  report.raw_network = taught(false);
+  report.raw = letDrive(scenario, setup, *report.raw_network, options.evaluated, jobs);
+  tell(told("network on his labels", report.raw));
+  report.corrected_network = taught(true);
+  report.corrected = letDrive(scenario, setup, *report.corrected_network, options.evaluated, jobs);
+  tell(told("network on corrected labels", report.corrected));
+  return report;
 }
 
 }  // namespace tunnel_pilot::learning

@@ -69,7 +69,9 @@ std::vector<std::string> topicsOfType(const rosbag::Bag& bag, const std::string&
 }
 
 bool sameTopic(const std::string& a, const std::string& b) {
-  const auto bare = [](const std::string& topic) { return topic.substr(topic.rfind('/', 0) == 0 ? 1 : 0); };
+  const auto bare = [](const std::string& topic) {
+    return topic.substr(topic.rfind('/', 0) == 0 ? 1 : 0);
+  };
   return bare(a) == bare(b);
 }
 

@@ -31,8 +31,8 @@ std::vector<std::string> topicsOfType(const rosbag::Bag& bag, const std::string&
 /// Some bags name their topics with the leading slash, some without.
 bool sameTopic(const std::string& a, const std::string& b);
 
-/// The scans' topic: the wanted one; if none is wanted, the only one or `scan`. Throws std::runtime_error
-/// when there is none or several to choose from.
+/// The scans' topic: the wanted one; if none is wanted, the only one or `scan`. Throws
+/// std::runtime_error when there is none or several to choose from.
 std::string scanTopic(const rosbag::Bag& bag, const std::string& wanted);
 
 Stamp stampOf(const std_msgs::Header& header);
@@ -43,9 +43,9 @@ drivers::Motion motionOf(const nav_msgs::Odometry& message);
 /// A bag's own sizes are not to be trusted: this process gets no more than 4 GiB from now on.
 void limitMemory();
 
-/// Runs `work` in a process of its own and returns its answer: a damaged bag can end a process inside the
-/// bag library (assertions, reads out of bounds). Exceptions of `work` and such an end are told on the
-/// error stream behind `who`, and give kBadInput.
+/// Runs `work` in a process of its own and returns its answer: a damaged bag can end a process inside
+/// the bag library (assertions, reads out of bounds). Exceptions of `work` and such an end are told on
+/// the error stream behind `who`, and give kBadInput.
 int runGuarded(const std::string& who, const std::function<int()>& work);
 
 }  // namespace tunnel_pilot::tools

@@ -36,6 +36,24 @@ TEST(DriveMetrics, OffsetsMeanRmsAndLargestAreThoseOfTheTrack) {
   EXPECT_NEAR(metrics.at("distance"), 90.0, 0.2);
 }
 
+TEST(DriveMetrics, InsideOfBendsIsLeftInLeftOnesAndRightInRightOnes) {
+  for (const double side : {1.0, -1.0}) {
+    const geometry::Path line =
+        geometry::buildPath({{40.0, 0.0, 0.0}, {12.0, side / 12, side / 12}, {40.0, 0.0, 0.0}}, {}, 0.1);
+    auto track = driveAlong(0.0, 90.0, 0.1);
+    for (TrackSample& s : track) {
+      const bool bend = s.station > 39.8 && s.station < 52.2;
+      s.lateral_offset = bend ? 0.27 * side : -0.5 * side;  // straights do not count
+    }
+    EXPECT_NEAR(driveMetrics(track, line).at("inside_mean"), 0.27, 1e-3);
+  }
+}
+
+TEST(DriveMetrics, WithoutBendsNothingIsInsideOfThem) {
+  const auto track = driveAlong(0.0, 30.0, 0.1);
+  EXPECT_EQ(driveMetrics(track, straightBendStraight()).count("inside_mean"), 0U);
+}
+
 TEST(DriveMetrics, HeadingOnStraightsLeavesTheBendOut) {
   auto track = driveAlong(0.0, 90.0, 0.1);
   for (TrackSample& s : track) s.heading_error = s.station > 40.0 && s.station < 52.0 ? 0.2 : 0.01;

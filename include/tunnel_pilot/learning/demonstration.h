@@ -34,6 +34,7 @@ struct Lesson {
   /// To be added to the label, to steer to the centre of the tunnel instead of where he drove [rad];
   /// none where the tunnel was not measured long enough.
   std::optional<float> correction;
+  float offset = 0.0F;  ///< left of the middle when his demand began to act; with a correction only [m]
 };
 
 /// Turns a drive of anybody, recorded or simulated, into lessons, from measurements alone. A driver's
@@ -103,7 +104,7 @@ class Demonstration {
   std::optional<Deviation> fitted(std::size_t middle) const;
   void finishPending();
   std::optional<Lesson> lessonOf(Pending& pending) const;
-  std::optional<float> correctionOf(Stamp scan, double speed) const;
+  void correct(Stamp scan, Lesson& lesson) const;
   void forgetOld();
 
   DemonstrationParameters parameters_;

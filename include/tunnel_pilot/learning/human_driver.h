@@ -10,10 +10,10 @@ namespace tunnel_pilot::learning {
 
 /// How a human drives.
 struct HumanHabit {
-  double cut = 0.36;       ///< his line lies this far inside of tight bends [m]
+  double cut = 0.42;       ///< his line lies this far inside of tight bends [m]
   double turn_in = 3.0;    ///< he goes there so far before the bend [m]
-  double weave = 0.25;     ///< he wanders, at most so far [m]
-  double most = 0.65;           ///< both together never take him farther from the middle: the walls [m]
+  double weave = 0.5;      ///< he wanders, at most so far [m]
+  double most = 0.65;      ///< both together never take him farther from the middle: the walls [m]
   double speed_min = 2.4;  ///< of the speed that he holds, one for each drive [m/s]
   double speed_max = 3.1;
 };

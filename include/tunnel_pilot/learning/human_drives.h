@@ -3,12 +3,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "tunnel_pilot/learning/demonstration.h"
 #include "tunnel_pilot/learning/human_driver.h"
-#include "tunnel_pilot/learning/network_trainer.h"
+#include "tunnel_pilot/learning/recipe.h"
 #include "tunnel_pilot/simulation/episode.h"
 
 namespace tunnel_pilot::learning {
@@ -27,48 +28,41 @@ struct HumanDrive {
 HumanDrive driveAsHuman(const simulation::Scenario& scenario, const simulation::Setup& setup,
                         const simulation::EpisodePlan& plan, const HumanHabit& habit, int keep_every);
 
-/// Lessons as a data set: labels as he drove, or corrected (then without those that could not be).
+/// Lessons as a data set: labels as he drove, or corrected ones, without the lessons that could not be.
+/// Of the corrected ones those inside of bends are thinned until they are no more than those as far
+/// outside (a few stay, which teach to come back): a network that saw bends from inside almost only
+/// takes itself to be inside there, even in the middle.
 DataSet examplesOf(const std::vector<Lesson>& lessons, bool corrected);
 
-/// Human's drives for training.
+/// The human experiment.
 struct HumanOptions {
   HumanHabit habit;
-  std::uint64_t first_seed = 1000;  ///< of the drives, each seed both ways
-  int drives = 80;
-  int validation_drives = 8;  ///< the seeds behind those
-  int keep_every = 2;
-  int jobs = 2;
+  std::uint64_t first_seed = 1000;  ///< of his tunnels; none that anything is reported on
+  int tunnels = 80;                 ///< driven through, each both ways
+  int keep_every = 4;               ///< scans
+  int evaluated = 20;               ///< seeds that the networks drive, from the scenario's first one
 };
 
-struct HumanLessons {
-  std::vector<Lesson> training, validation;
-  std::vector<simulation::Metrics> metrics;  ///< of every drive
-  double inside_mean = 0.0;                  ///< mean over the drives [m]
-  double inside_heading = 0.0;               ///< [rad]
+/// How far inside of bends somebody drives: metric inside_mean, one value a drive [m].
+struct InsideReport {
+  std::vector<double> inside;
+  int completed = 0;    ///< drives
+  double mean() const;  ///< [m]
 };
 
-/// `progress` is told the number of drives done, from one thread at a time.
-HumanLessons collectHumanLessons(const simulation::Scenario& scenario, const simulation::Setup& setup,
-                                 const HumanOptions& options, const std::function<void(int)>& progress);
-
-/// The human experiment: is an inside cut learned, and does the correction take it out again? Trains two
-/// networks of the given kind on the human's drives alone, one with his labels and one with corrected
-/// ones, and lets each drive the scenario's first `seeds` seeds (from its first_seed), each both ways
-/// where it says so.
 struct HumanReport {
-  double human_inside = 0.0;                              ///< inside_mean, mean over drives [m]
-  double human_heading = 0.0;                             ///< [rad]
-  std::vector<simulation::EpisodeResult> raw, corrected;  ///< drives of the networks, without tracks
-  double raw_inside = 0.0, corrected_inside = 0.0;        ///< mean over the drives [m]
+  InsideReport human;
+  double human_heading = 0.0;  ///< to the inside of bends, mean [rad]
+  InsideReport raw, corrected;
+  std::optional<neural::NetworkFile> raw_network, corrected_network;  ///< both there
 };
 
-struct HumanNetworks {
-  neural::NetworkFile raw, corrected;
-};
-
+/// Is an inside cut learned, and does the correction take it out again? The human drives through tunnels
+/// of the scenario's kind; two networks are trained as the recipe says, but on his drives alone, one
+/// with his labels and one with corrected ones; each drives the scenario. `scenario` and `setup` as for
+/// driveAsHuman. `tell` gets lines for people. The result does not depend on `jobs`.
 HumanReport humanExperiment(const simulation::Scenario& scenario, const simulation::Setup& setup,
-                            const HumanOptions& options, const TrainingOptions& training, int seeds,
-                            HumanNetworks& networks,
+                            const HumanOptions& options, const Recipe& recipe, int jobs,
                             const std::function<void(const std::string&)>& tell);
 
 }  // namespace tunnel_pilot::learning
