@@ -227,6 +227,7 @@ InsideReport letDrive(const simulation::Scenario& scenario, simulation::Setup se
   InsideReport report;
   const auto plans = simulation::episodePlans(scenario, seeds);
   for (const auto& result : simulation::runEpisodes(scenario, setup, plans, jobs, [](std::size_t) {})) {
+    ++report.drives;
     report.completed += result.metrics.at("completed") > 0.0 ? 1 : 0;
     const auto inside = result.metrics.find("inside_mean");
     if (inside != result.metrics.end()) report.inside.push_back(inside->second);
@@ -236,8 +237,8 @@ InsideReport letDrive(const simulation::Scenario& scenario, simulation::Setup se
 
 std::string told(const char* who, const InsideReport& report) {
   char line[160];
-  std::snprintf(line, sizeof line, "%s: %.1f mm inside of bends, %d of %zu drives completed", who,
-                1e3 * report.mean(), report.completed, report.inside.size());
+  std::snprintf(line, sizeof line, "%s: %.1f mm inside of bends, %d of %d drives completed", who,
+                1e3 * report.mean(), report.completed, report.drives);
   return line;
 }
 
@@ -257,6 +258,7 @@ HumanReport humanExperiment(const simulation::Scenario& scenario, const simulati
   std::vector<Lesson> lessons;
   for (HumanDrive& drive : drives) {
     report.human.inside.push_back(drive.metrics.at("inside_mean"));
+    ++report.human.drives;
     report.human.completed += drive.metrics.at("contacts") > 0.0 ? 0 : 1;
     report.human_heading += drive.inside_heading / static_cast<double>(drives.size());
     std::move(drive.lessons.begin(), drive.lessons.end(), std::back_inserter(lessons));

@@ -43,10 +43,11 @@ struct HumanOptions {
   int evaluated = 20;               ///< seeds that the networks drive, from the scenario's first one
 };
 
-/// How far inside of bends somebody drives: metric inside_mean, one value a drive [m].
+/// How far inside of bends somebody drives: metric inside_mean [m], one value a drive that met a bend.
 struct InsideReport {
   std::vector<double> inside;
-  int completed = 0;    ///< drives
+  int drives = 0;
+  int completed = 0;    ///< of them
   double mean() const;  ///< [m]
 };
 
