@@ -8,7 +8,7 @@ namespace tunnel_pilot::learning {
 namespace {
 
 // Components with less than this share of the greatest variance are no more amplified.
-constexpr float kLeastVariance = 1e-5F;
+constexpr float kLeastVariance = 1e-7F;
 
 }  // namespace
 

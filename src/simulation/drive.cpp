@@ -1,4 +1,7 @@
+#include <algorithm>
+
 #include "closed_loop.h"
+#include "tunnel_pilot/simulation/ideal_drive.h"
 
 namespace tunnel_pilot::simulation {
 namespace {
@@ -18,6 +21,9 @@ class Drive : public ClosedLoop {
       : ClosedLoop(scenario, setup, withTopSpeed(setup.pilot, drive.top_speed),
                    world::loadWorld(drive.world_file, {plan.seed, plan.reversed}), plan.seed),
         drive_(drive),
+        sight_(setup.pilot.perception.wall_segmentation.lookahead),
+        acceleration_(setup.pilot.arbiter.limiter.max_acceleration),
+        governor_(setup.pilot.arbiter.governor),
         observer_(observer) {
     const double length = simulator_.world().design_line.length();
     if (drive.station <= length) return;
@@ -52,14 +58,14 @@ class Drive : public ClosedLoop {
   }
 
   std::string driveOn() {
-    const double start = simulator_.truth().station;
+    start_ = simulator_.truth().station;
     const geometry::Path& line = simulator_.world().design_line;
-    const double way = drive_.distance > 0.0 ? drive_.distance
-                       : line.closed()       ? line.length()
-                                             : line.length() - start - kOpenEnd;
+    way_ = drive_.distance > 0.0 ? drive_.distance
+           : line.closed()       ? line.length()
+                                 : line.length() - start_ - kOpenEnd;
     while (true) {
       step();
-      if (simulator_.truth().station - start >= way) return kCompleted;
+      if (simulator_.truth().station - start_ >= way_) return kCompleted;
       std::string why = whyOver(drive_.time_limit);
       if (!why.empty()) return why;
     }
@@ -71,12 +77,22 @@ class Drive : public ClosedLoop {
     metrics["valid_share"] = perceptionMetrics(perception_).at("valid_share");
     metrics["contacts"] = ending == "contact" ? 1.0 : 0.0;
     metrics["completed"] = ending == kCompleted ? 1.0 : 0.0;
-    if (ending == kCompleted) metrics["lap_time"] = time();
+    if (ending.rfind("stopped", 0) == 0) metrics["stops"] = std::max(metrics["stops"], 1.0);
+    if (ending == kCompleted) {
+      metrics["lap_time"] = time();
+      metrics["lap_efficiency"] = idealTime() / time();
+    }
     if (pilot_.lidarDriver()) metrics["lidar_driver_share"] = lidarDriverShare();
     return metrics;
   }
 
   static constexpr const char* kCompleted = "way driven";
+
+  double idealTime() const {
+    return idealDriveTime(simulator_.world().design_line,
+                          {start_, way_, drive_.rolling_speed, drive_.top_speed, acceleration_, sight_},
+                          governor_, truck_);
+  }
 
   double lidarDriverShare() const {
     return track_.empty() ? 0.0
@@ -89,6 +105,11 @@ class Drive : public ClosedLoop {
   }
 
   DriveExperiment drive_;
+  double sight_;         ///< how far the perception follows walls [m]
+  double acceleration_;  ///< that the arbiter allows [m/s^2]
+  supervision::SpeedGovernor governor_;
+  double start_ = 0.0;  ///< station [m]
+  double way_ = 0.0;    ///< [m]
   DriveObserver* observer_;
   std::size_t by_lidar_driver_ = 0;  ///< truths while it steered
   std::vector<PerceptionSample> perception_;

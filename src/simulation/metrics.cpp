@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kDegrees = 57.29577951308232;
 constexpr double kStandstill = 0.05;     // [m/s]
+constexpr double kUnderWay = 0.5;        // from this speed on a standstill is a stop [m/s]
 constexpr double kStraight = 1e-4;       // curvature below which a line is straight [1/m]
 constexpr double kUnwinding = 10.0;      // three lengths l_r after a bend [m]
 constexpr double kTurningIn = 3.0;       // steering begins before a bend, by its delays [m]
@@ -23,7 +24,11 @@ const std::vector<MetricText>& metricTexts() {
       {"lateral_mean", "lateral offset, mean", "mm", 1e3},
       {"lateral_rms", "lateral offset, RMS", "m", 1.0},
       {"lateral_max", "lateral offset, largest", "m", 1.0},
-      {"inside_mean", "lateral offset to the inside of bends, mean", "mm", 1e3},
+      {"lateral_mean_left_bends", "lateral offset in bends to the left, mean", "mm", 1e3},
+      {"lateral_mean_right_bends", "lateral offset in bends to the right, mean", "mm", 1e3},
+      {"lateral_rms_left_bends", "lateral offset in bends to the left, RMS", "m", 1.0},
+      {"lateral_rms_right_bends", "lateral offset in bends to the right, RMS", "m", 1.0},
+      {"inside_mean", "offset to the inside of bends, mean", "mm", 1e3},
       {"heading_mean", "heading error, mean", "deg", kDegrees},
       {"heading_rms", "heading error, RMS", "deg", kDegrees},
       {"heading_rms_straights", "heading error on straights, RMS", "deg", kDegrees},
@@ -34,7 +39,9 @@ const std::vector<MetricText>& metricTexts() {
       {"stops", "stops on the way", "", 1.0},
       {"completed", "way completed", "", 1.0},
       {"lap_time", "lap time", "s", 1.0},
+      {"lap_efficiency", "the governor's ideal lap time over the lap time", "%", 100.0},
       {"speed_mean", "speed, mean", "m/s", 1.0},
+      {"speed_max_straights", "speed on straights, largest", "m/s", 1.0},
       {"distance", "distance driven", "m", 1.0},
       {"heading_zero_time", "heading first zero after", "s", 1.0},
       {"settle_time", "offset below 0.1 m for good after", "s", 1.0},
@@ -89,6 +96,40 @@ bool isSettledStraight(const geometry::Path& line, double station) {
          isStraight(line, station + kTurningIn);
 }
 
+// How often the truck came to a standstill on its way.
+int stopsIn(const std::vector<TrackSample>& track) {
+  int stops = 0;
+  bool under_way = false;
+  for (const TrackSample& sample : track) {
+    const double speed = std::abs(sample.speed);
+    if (under_way && speed < kStandstill) ++stops;
+    under_way = speed > kUnderWay || (under_way && speed >= kStandstill);
+  }
+  return stops;
+}
+
+// The offsets by the side to which the line bends.
+Metrics bendMetrics(const std::vector<TrackSample>& track) {
+  Moments left, right, inside;
+  for (const TrackSample& sample : track) {
+    if (std::abs(sample.speed) < kStandstill || std::abs(sample.curvature) < kStraight) continue;
+    const bool to_the_left = sample.curvature > 0.0;
+    (to_the_left ? left : right).add(sample.lateral_offset);
+    inside.add(to_the_left ? sample.lateral_offset : -sample.lateral_offset);
+  }
+  Metrics metrics;
+  if (left.count > 0) {
+    metrics["lateral_mean_left_bends"] = left.mean();
+    metrics["lateral_rms_left_bends"] = left.rms();
+  }
+  if (right.count > 0) {
+    metrics["lateral_mean_right_bends"] = right.mean();
+    metrics["lateral_rms_right_bends"] = right.rms();
+  }
+  if (inside.count > 0) metrics["inside_mean"] = inside.mean();
+  return metrics;
+}
+
 std::string classOfBend(double curvature) {
   if (std::abs(curvature) < kStraight) return "straight";
   const double radius = 1.0 / std::abs(curvature);
@@ -122,22 +163,23 @@ double quantile(std::vector<double> values, double share) {
 }
 
 Metrics driveMetrics(const std::vector<TrackSample>& track, const geometry::Path& line) {
-  Moments lateral, inside, heading, heading_straight, speed;
+  Moments lateral, heading, heading_straight, speed;
   std::map<int, Moments>
       hinge;  // by straight: each has a mean of its own, by the sensor's bias and slip
   double clearance = std::numeric_limits<double>::infinity();
   bool settled = false;
   int straight = 0;
+  double fastest_straight = 0.0;
   for (const TrackSample& sample : track) {
     clearance = std::min(clearance, sample.clearance);
     if (std::abs(sample.speed) < kStandstill) continue;
     lateral.add(sample.lateral_offset);
-    if (!line.empty() && !isStraight(line, sample.station)) {
-      inside.add(std::copysign(1.0, line.at(sample.station).curvature) * sample.lateral_offset);
-    }
     heading.add(sample.heading_error);
     speed.add(sample.speed);
-    if (isStraight(line, sample.station)) heading_straight.add(sample.heading_error);
+    if (isStraight(line, sample.station)) {
+      heading_straight.add(sample.heading_error);
+      fastest_straight = std::max(fastest_straight, sample.speed);
+    }
     const bool was_settled = settled;
     settled = isSettledStraight(line, sample.station);
     if (settled && !was_settled) ++straight;
@@ -148,17 +190,20 @@ Metrics driveMetrics(const std::vector<TrackSample>& track, const geometry::Path
     wobble.squares += moments.deviation() * moments.deviation() * static_cast<double>(moments.count);
     wobble.count += moments.count;
   }
-  Metrics metrics = {{"lateral_mean", lateral.mean()},
-                     {"lateral_rms", lateral.rms()},
-                     {"lateral_max", lateral.largest},
-                     {"heading_mean", heading.mean()},
-                     {"heading_rms", heading.rms()},
-                     {"heading_rms_straights", heading_straight.rms()},
-                     {"articulation_std_straights", wobble.rms()},
-                     {"clearance_min", clearance},
-                     {"speed_mean", speed.mean()},
-                     {"distance", track.empty() ? 0.0 : track.back().station - track.front().station}};
-  if (inside.count > 0) metrics["inside_mean"] = inside.mean();
+  Metrics metrics = bendMetrics(track);
+  metrics.merge(
+      Metrics{{"lateral_mean", lateral.mean()},
+              {"lateral_rms", lateral.rms()},
+              {"lateral_max", lateral.largest},
+              {"heading_mean", heading.mean()},
+              {"heading_rms", heading.rms()},
+              {"heading_rms_straights", heading_straight.rms()},
+              {"articulation_std_straights", wobble.rms()},
+              {"clearance_min", clearance},
+              {"speed_mean", speed.mean()},
+              {"speed_max_straights", fastest_straight},
+              {"stops", static_cast<double>(stopsIn(track))},
+              {"distance", track.empty() ? 0.0 : track.back().station - track.front().station}});
   return metrics;
 }
 

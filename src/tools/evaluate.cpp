@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <boost/program_options.hpp>
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <iostream>
@@ -29,6 +30,7 @@ struct Arguments {
   std::string config;
   std::string driver;
   std::string network;
+  long long first_seed = -1;  // -1: the scenario's
   int seeds = 0;
   int jobs = 1;
 };
@@ -51,6 +53,8 @@ bool parse(int argc, char** argv, Arguments& arguments) {
       "scenario file; also without the option's name")("seeds",
                                                        options::value(&arguments.seeds)->value_name("N"),
                                                        "number of seeds instead of the scenario's")(
+      "first-seed", options::value(&arguments.first_seed)->value_name("N"),
+      "first seed instead of the scenario's")(
       "out", options::value(&arguments.out)->value_name("DIR"),
       "writes summary.json, CSV files and plots to DIR/<scenario>; without it only the table is "
       "printed")("config", options::value(&arguments.config)->value_name("DIR"),
@@ -72,6 +76,10 @@ bool parse(int argc, char** argv, Arguments& arguments) {
   options::notify(values);
   if (values.count("seeds") != 0 && (arguments.seeds < 1 || arguments.seeds > 100'000)) {
     throw options::error("--seeds must be 1 to 100000");
+  }
+  if (values.count("first-seed") != 0 &&
+      (arguments.first_seed < 0 || arguments.first_seed > 1'000'000'000)) {
+    throw options::error("--first-seed must be 0 to 1000000000");
   }
   if (arguments.jobs < 1 || arguments.jobs > 256) throw options::error("--jobs must be 1 to 256");
   const simulation::DriverChoice driver = driverOf(arguments);
@@ -141,6 +149,7 @@ std::string networkLine(const neural::NetworkFile& network,
 bool evaluate(const std::string& file, const Arguments& arguments) {
   simulation::Scenario scenario = simulation::loadScenario(file);
   if (!arguments.config.empty()) scenario.config_folder = arguments.config;
+  if (arguments.first_seed >= 0) scenario.first_seed = static_cast<std::uint64_t>(arguments.first_seed);
   const int seeds = arguments.seeds > 0 ? arguments.seeds : scenario.seeds;
   simulation::Setup setup = simulation::loadSetup(scenario);
   simulation::chooseDriver(scenario, driverOf(arguments), arguments.network, setup);

@@ -143,6 +143,11 @@ TEST(Episode, DrivesItsWayAndTellsItsFigures) {
   EXPECT_LT(result.metrics.at("lateral_max"), 0.25);
   EXPECT_GT(result.metrics.at("clearance_min"), 2.0);
   EXPECT_FALSE(result.perception.empty());
+  EXPECT_EQ(result.metrics.at("stops"), 0.0);
+  // From standstill over 30 m to 2 m/s: 2.5 s and 13.75 s, and the truck's own delays.
+  EXPECT_NEAR(result.metrics.at("lap_efficiency") * result.metrics.at("lap_time"), 16.25, 0.05);
+  EXPECT_GT(result.metrics.at("lap_efficiency"), 0.85);
+  EXPECT_LE(result.metrics.at("lap_efficiency"), 1.0);
 }
 
 TEST(Episode, DependsOnItsSeedAlone) {

@@ -36,24 +36,6 @@ TEST(DriveMetrics, OffsetsMeanRmsAndLargestAreThoseOfTheTrack) {
   EXPECT_NEAR(metrics.at("distance"), 90.0, 0.2);
 }
 
-TEST(DriveMetrics, InsideOfBendsIsLeftInLeftOnesAndRightInRightOnes) {
-  for (const double side : {1.0, -1.0}) {
-    const geometry::Path line =
-        geometry::buildPath({{40.0, 0.0, 0.0}, {12.0, side / 12, side / 12}, {40.0, 0.0, 0.0}}, {}, 0.1);
-    auto track = driveAlong(0.0, 90.0, 0.1);
-    for (TrackSample& s : track) {
-      const bool bend = s.station > 39.8 && s.station < 52.2;
-      s.lateral_offset = bend ? 0.27 * side : -0.5 * side;  // straights do not count
-    }
-    EXPECT_NEAR(driveMetrics(track, line).at("inside_mean"), 0.27, 1e-3);
-  }
-}
-
-TEST(DriveMetrics, WithoutBendsNothingIsInsideOfThem) {
-  const auto track = driveAlong(0.0, 30.0, 0.1);
-  EXPECT_EQ(driveMetrics(track, straightBendStraight()).count("inside_mean"), 0U);
-}
-
 TEST(DriveMetrics, HeadingOnStraightsLeavesTheBendOut) {
   auto track = driveAlong(0.0, 90.0, 0.1);
   for (TrackSample& s : track) s.heading_error = s.station > 40.0 && s.station < 52.0 ? 0.2 : 0.01;
@@ -89,6 +71,43 @@ TEST(DriveMetrics, StandstillDoesNotDiluteTheFiguresButItsClearanceCounts) {
   const Metrics metrics = driveMetrics(track, straightBendStraight());
   EXPECT_NEAR(metrics.at("lateral_rms"), 0.2, 1e-9);
   EXPECT_DOUBLE_EQ(metrics.at("clearance_min"), 0.4);
+}
+
+TEST(DriveMetrics, OffsetsInBendsAreToldBySideAndAsCutting) {
+  auto track = driveAlong(0.0, 90.0, 0.1);
+  for (TrackSample& s : track) {
+    s.curvature = s.station < 30.0 ? 0.0 : s.station < 60.0 ? 0.05 : -0.05;
+    s.lateral_offset = s.curvature == 0.0 ? 0.5 : s.curvature > 0.0 ? 0.2 : 0.1;
+  }
+  const Metrics metrics = driveMetrics(track, straightBendStraight());
+  EXPECT_NEAR(metrics.at("lateral_mean_left_bends"), 0.2, 1e-9);
+  EXPECT_NEAR(metrics.at("lateral_rms_left_bends"), 0.2, 1e-9);
+  EXPECT_NEAR(metrics.at("lateral_mean_right_bends"), 0.1, 1e-9);
+  EXPECT_NEAR(metrics.at("lateral_rms_right_bends"), 0.1, 1e-9);
+  EXPECT_NEAR(metrics.at("inside_mean"), (0.2 - 0.1) / 2.0, 1e-3);
+}
+
+TEST(DriveMetrics, WithoutABendToOneSideItsOffsetIsNotTold) {
+  auto track = driveAlong(0.0, 90.0, 0.1);
+  for (TrackSample& s : track) s.curvature = s.station < 30.0 ? 0.0 : 0.05;
+  const Metrics metrics = driveMetrics(track, straightBendStraight());
+  EXPECT_EQ(metrics.count("lateral_mean_left_bends"), 1u);
+  EXPECT_EQ(metrics.count("lateral_mean_right_bends"), 0u);
+}
+
+TEST(DriveMetrics, LargestSpeedOnStraightsLeavesTheBendOut) {
+  auto track = driveAlong(0.0, 90.0, 0.1);
+  for (TrackSample& s : track) s.speed = s.station > 40.0 && s.station < 52.0 ? 6.0 : s.station / 20.0;
+  EXPECT_NEAR(driveMetrics(track, straightBendStraight()).at("speed_max_straights"), 4.5, 0.01);
+}
+
+TEST(DriveMetrics, AStopIsAStandstillAfterDrivingNotTheOneItStartsFrom) {
+  auto track = driveAlong(0.0, 90.0, 0.1);
+  for (std::size_t i = 0; i < track.size(); ++i) track[i].speed = i < 50 ? 0.0 : 3.0;
+  EXPECT_EQ(driveMetrics(track, straightBendStraight()).at("stops"), 0.0);
+  for (std::size_t i = 300; i < 330; ++i) track[i].speed = i % 2 == 0 ? 0.0 : 0.06;  // stands, shaking
+  for (std::size_t i = 600; i < 640; ++i) track[i].speed = 0.0;
+  EXPECT_EQ(driveMetrics(track, straightBendStraight()).at("stops"), 2.0);
 }
 
 TEST(ReturnMetrics, FindTheCrossingsTheSettlingAndTheOvershoot) {

@@ -69,6 +69,17 @@ TEST_F(Evaluate, SameScenarioAndSeedsGiveTheSameBytesOnAnyNumberOfThreads) {
   EXPECT_EQ(pictures, 2) << "the median and the worst episode";
 }
 
+TEST_F(Evaluate, AnotherFirstSeedRunsOtherSeeds) {
+  const std::string file = scenario("{metric: lateral_rms, paper: '-', judge: every_seed, max: 9.0}");
+  ASSERT_EQ(
+      evaluate({file, "--first-seed", "2000", "--seeds", "2", "--out", place_.file("a"), "--jobs", "2"})
+          .status,
+      0);
+  const auto json = nlohmann::json::parse(contentOf(place_.file("a/short/summary.json")));
+  EXPECT_EQ(json.at("episodes").front().at("seed"), 2000);
+  EXPECT_EQ(json.at("episodes").back().at("seed"), 2001);
+}
+
 TEST_F(Evaluate, SummaryIsJsonWithTheFingerprintsOfWhatWasRun) {
   const std::string file = scenario("{metric: lateral_rms, paper: '-', judge: every_seed, max: 9.0}");
   ASSERT_EQ(evaluate({file, "--seeds", "1", "--out", place_.file("a")}).status, 0);
@@ -108,6 +119,8 @@ TEST_F(Evaluate, BadInputExitsTwoAndSaysWhy) {
       {{"nowhere.yaml"}, "nowhere.yaml"},
       {{good, "--seeds", "0"}, "--seeds"},
       {{good, "--seeds", "many"}, "seeds"},
+      {{good, "--first-seed", "-1"}, "--first-seed"},
+      {{good, "--first-seed", "1e9"}, "first-seed"},
       {{good, "--jobs", "0"}, "--jobs"},
       {{good, "--colour", "red"}, "colour"},
       {{good, "--driver", "somebody"}, "--driver"},
@@ -136,8 +149,8 @@ TEST_F(Evaluate, AFolderThatCannotBeIsToldBeforeTheRuns) {
 TEST_F(Evaluate, HelpExplainsItsOptions) {
   const Outcome outcome = evaluate({"--help"});
   EXPECT_EQ(outcome.status, 0);
-  for (const char* option :
-       {"--seeds", "--out", "--jobs", "--config", "--driver", "--network", "Exit status"}) {
+  for (const char* option : {"--first-seed", "--seeds", "--out", "--jobs", "--config", "--driver",
+                             "--network", "Exit status"}) {
     EXPECT_NE(outcome.output.find(option), std::string::npos) << option;
   }
 }

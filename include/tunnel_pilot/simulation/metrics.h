@@ -56,10 +56,12 @@ struct MetricText {
 const MetricText& metricText(const std::string& key);
 bool isMetric(const std::string& key);
 
-/// Figures of a drive along `line` (a tunnel's design line): lateral_mean, _rms, _max; inside_mean
-/// of the offset towards the inside of bends, where there are any; heading_mean, _rms over all, and heading_rms_straights where the line is straight; articulation_std_straights where
+/// Figures of a drive along `line` (a tunnel's design line): lateral_mean, _rms, _max; heading_mean,
+/// _rms over all, and heading_rms_straights where the line is straight; articulation_std_straights where
 /// it has been straight for 10 m and stays so for 3 m (before that the hinge is still unwinding, by
-/// geometry); clearance_min, speed_mean, distance. Samples at standstill do not count.
+/// geometry); clearance_min, speed_mean, speed_max_straights, distance; stops, the standstills on the
+/// way; and where the line bends, the offsets by side: lateral_mean and _rms with _left_bends and
+/// _right_bends, inside_mean (positive: bends are cut). Samples at standstill do not count.
 Metrics driveMetrics(const std::vector<TrackSample>& track, const geometry::Path& line);
 
 /// Figures of a return to the centre from (offset, heading): heading_zero_time [s], settle_time (from
