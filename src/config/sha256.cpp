@@ -1,6 +1,8 @@
 #include "tunnel_pilot/config/sha256.h"
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 
@@ -51,23 +53,43 @@ void compress(std::array<std::uint32_t, 8>& hash, const unsigned char* block) {
 
 }  // namespace
 
-std::string sha256(const std::string& text) {
-  std::array<std::uint32_t, 8> hash = {0x6a09e667, 0xbb67ae85, 0x3c6ef372, 0xa54ff53a,
-                                       0x510e527f, 0x9b05688c, 0x1f83d9ab, 0x5be0cd19};
-  std::string padded = text + '\x80';
-  while (padded.size() % 64 != 56) padded += '\0';
-  const std::uint64_t bits = std::uint64_t{text.size()} * 8;
-  for (int shift = 56; shift >= 0; shift -= 8) padded += static_cast<char>(bits >> shift & 0xFF);
-  for (std::size_t i = 0; i < padded.size(); i += 64) {
-    compress(hash, reinterpret_cast<const unsigned char*>(padded.data()) + i);
+void Sha256::update(const void* data, std::size_t size) {
+  const auto* bytes = static_cast<const unsigned char*>(data);
+  std::size_t filled = size_ % block_.size();
+  size_ += size;
+  while (size > 0) {
+    const std::size_t taken = std::min(size, block_.size() - filled);
+    std::copy_n(bytes, taken, block_.begin() + static_cast<std::ptrdiff_t>(filled));
+    bytes += taken;
+    size -= taken;
+    filled += taken;
+    if (filled < block_.size()) return;
+    compress(hash_, block_.data());
+    filled = 0;
   }
+}
+
+std::string Sha256::finish() {
+  const std::uint64_t bits = size_ * 8;
+  std::array<unsigned char, 72> end{0x80};
+  const std::size_t zeros = (119 - size_ % 64) % 64;  // after the 0x80, to 56 bytes of the last block
+  for (std::size_t i = 0; i < 8; ++i) {
+    end[1 + zeros + i] = static_cast<unsigned char>(bits >> (56 - 8 * i) & 0xFF);
+  }
+  update(end.data(), 1 + zeros + 8);
   std::string hex;
-  for (const std::uint32_t word : hash) {
+  for (const std::uint32_t word : hash_) {
     char digits[9];
     std::snprintf(digits, sizeof digits, "%08x", word);
     hex += digits;
   }
   return hex;
+}
+
+std::string sha256(const std::string& text) {
+  Sha256 hash;
+  hash.update(text.data(), text.size());
+  return hash.finish();
 }
 
 }  // namespace tunnel_pilot::config

@@ -1,11 +1,8 @@
-#include <atomic>
 #include <cmath>
 #include <cstdio>
-#include <exception>
 #include <memory>
-#include <mutex>
-#include <thread>
 
+#include "in_parallel.h"
 #include "tunnel_pilot/config/sha256.h"
 #include "tunnel_pilot/drivers/inverse_ranges.h"
 #include "tunnel_pilot/drivers/scan_domain.h"
@@ -20,29 +17,6 @@ namespace {
 constexpr std::uint64_t kSeedsOfASource = 1000;
 constexpr double kDegrees = 57.29577951308232;
 constexpr std::uint32_t kHeldOutShare = 5;  // of data from files, every so many tunnels
-
-// Calls work(0) ... work(count - 1) on `jobs` threads; throws the first exception on.
-void inParallel(std::size_t count, int jobs, const std::function<void(std::size_t)>& work) {
-  std::atomic<std::size_t> next{0};
-  std::exception_ptr failure;
-  std::mutex mutex;
-  const auto run = [&] {
-    for (std::size_t i = next++; i < count; i = next++) {
-      try {
-        work(i);
-      } catch (...) {
-        const std::lock_guard<std::mutex> lock(mutex);
-        if (!failure) failure = std::current_exception();
-        next = count;
-      }
-    }
-  };
-  std::vector<std::thread> threads;
-  for (int j = 1; j < jobs; ++j) threads.emplace_back(run);
-  run();
-  for (std::thread& thread : threads) thread.join();
-  if (failure) std::rethrow_exception(failure);
-}
 
 void append(DataSet& to, DataSet from) {
   to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));

@@ -3,16 +3,11 @@
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
 #include <sensor_msgs/LaserScan.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <boost/program_options.hpp>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <exception>
 #include <filesystem>
 #include <fstream>
@@ -22,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "bag_reading.h"
 #include "tunnel_pilot/drivers/motion_history.h"
 #include "tunnel_pilot/simulation/perception_chain.h"
 
@@ -31,9 +27,6 @@ namespace options = boost::program_options;
 using namespace tunnel_pilot;
 
 constexpr const char* kOdometryTopic = "odom";
-constexpr int kDone = 0;
-constexpr int kBadInput = 2;
-constexpr rlim_t kMemoryLimit = rlim_t{4} << 30;  // a bag's own sizes are not to be trusted [bytes]
 
 struct Arguments {
   std::string bag;
@@ -80,94 +73,6 @@ bool parse(int argc, char** argv, Arguments& arguments) {
   return true;
 }
 
-// The package's own parameter files: beside the build or in the install space this program stands in.
-std::string defaultConfig() {
-  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe");
-  for (std::filesystem::path folder = program.parent_path(); folder.has_relative_path();
-       folder = folder.parent_path()) {
-    for (const std::filesystem::path& config :
-         {folder / "config", folder / "share/tunnel_pilot/config"}) {
-      if (std::filesystem::exists(config / "centerline.yaml")) return config.string();
-    }
-  }
-  throw std::runtime_error("no parameter files found beside the program: name them with --config");
-}
-
-// The package's parameter files, but for those that the given folder has.
-std::vector<std::string> parameterFiles(const std::string& folder) {
-  std::vector<std::string> files = simulation::perceptionFiles(defaultConfig());
-  if (folder.empty()) return files;
-  const std::vector<std::string> given = simulation::perceptionFiles(folder);
-  bool any = false;
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    if (!std::filesystem::exists(given[i])) continue;
-    files[i] = given[i];
-    any = true;
-  }
-  if (!any) throw std::runtime_error("'" + folder + "' holds none of the perception's parameter files");
-  return files;
-}
-
-std::vector<std::string> topicsOfType(const rosbag::Bag& bag, const std::string& type) {
-  rosbag::View view(bag);
-  std::vector<std::string> topics;
-  for (const rosbag::ConnectionInfo* connection : view.getConnections()) {
-    if (connection->datatype == type) topics.push_back(connection->topic);
-  }
-  std::sort(topics.begin(), topics.end());
-  topics.erase(std::unique(topics.begin(), topics.end()), topics.end());
-  return topics;
-}
-
-// Some bags name their topics with the leading slash, some without.
-bool sameTopic(const std::string& a, const std::string& b) {
-  const auto bare = [](const std::string& topic) { return topic.substr(topic.rfind('/', 0) == 0 ? 1 : 0); };
-  return bare(a) == bare(b);
-}
-
-std::string scanTopic(const rosbag::Bag& bag, const std::string& wanted) {
-  const std::vector<std::string> topics = topicsOfType(bag, "sensor_msgs/LaserScan");
-  std::string list;
-  for (const std::string& topic : topics) list += " " + topic;
-  if (topics.empty()) throw std::runtime_error("the bag holds no sensor_msgs/LaserScan");
-  if (wanted.empty() && topics.size() == 1) return topics.front();
-  for (const std::string& topic : topics) {
-    if (sameTopic(topic, wanted.empty() ? "scan" : wanted)) return topic;
-  }
-  if (!wanted.empty()) {
-    throw std::runtime_error("the bag has no scans on '" + wanted + "', but on" + list);
-  }
-  throw std::runtime_error("the bag has several scan topics, choose one with --topic:" + list);
-}
-
-Stamp stampOf(const std_msgs::Header& header) {
-  return std::chrono::seconds(header.stamp.sec) + std::chrono::nanoseconds(header.stamp.nsec);
-}
-
-geometry::Scan scanOf(const sensor_msgs::LaserScan& message) {
-  geometry::Scan scan;
-  scan.stamp = stampOf(message.header);
-  scan.angle_min = message.angle_min;
-  scan.angle_increment = message.angle_increment;
-  scan.announced_angle_max = message.angle_max;
-  scan.time_increment = message.time_increment;
-  scan.range_min = message.range_min;
-  scan.range_max = message.range_max;
-  scan.ranges = message.ranges;
-  return scan;
-}
-
-drivers::Motion motionOf(const nav_msgs::Odometry& message) {
-  const auto& q = message.pose.pose.orientation;
-  drivers::Motion motion;
-  motion.stamp = stampOf(message.header);
-  motion.pose = {message.pose.pose.position.x, message.pose.pose.position.y,
-                 std::atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))};
-  motion.speed = message.twist.twist.linear.x;
-  motion.yaw_rate = message.twist.twist.angular.z;
-  return motion;
-}
-
 std::string row(Stamp stamp, const perception::Tunnel* tunnel) {
   char text[256];
   const auto ns = static_cast<long long>(stamp.count());
@@ -186,10 +91,10 @@ class Perceiver {
   Perceiver(const simulation::PerceptionParameters& parameters, const geometry::Pose& sensor)
       : chain_(parameters), sensor_(sensor) {}
 
-  void takeOdometry(const nav_msgs::Odometry& message) { odometry_.add(motionOf(message)); }
+  void takeOdometry(const nav_msgs::Odometry& message) { odometry_.add(tools::motionOf(message)); }
 
   void takeScan(const sensor_msgs::LaserScan& message) {
-    const geometry::Scan scan = scanOf(message);
+    const geometry::Scan scan = tools::scanOf(message);
     const perception::Tunnel* tunnel =
         chain_.update(scan, sensor_, odometry_.poseAt(scan.stamp), scan.stamp);
     csv_ += row(scan.stamp, tunnel);
@@ -213,9 +118,9 @@ class Perceiver {
 
 void readBag(const Arguments& arguments, Perceiver& perceiver) {
   rosbag::Bag bag(arguments.bag, rosbag::bagmode::Read);
-  const std::string topic = scanTopic(bag, arguments.topic);
+  const std::string topic = tools::scanTopic(bag, arguments.topic);
   rosbag::View view(bag, [&](const rosbag::ConnectionInfo* connection) {
-    return connection->topic == topic || sameTopic(connection->topic, kOdometryTopic);
+    return connection->topic == topic || tools::sameTopic(connection->topic, kOdometryTopic);
   });
   for (const rosbag::MessageInstance& message : view) {
     if (message.getTopic() == topic) {
@@ -235,7 +140,7 @@ void perceive(const Arguments& arguments) {
     throw std::runtime_error("the bag itself is named as --csv");
   }
   simulation::PerceptionParameters parameters =
-      simulation::loadPerception(parameterFiles(arguments.config));
+      simulation::loadPerception(tools::perceptionFilesFrom(arguments.config));
   parameters.scan_filter.check_age = false;  // a recording is as old as it is
   Perceiver perceiver(parameters,
                       {arguments.transform[0], arguments.transform[1], arguments.transform[2]});
@@ -252,40 +157,19 @@ void perceive(const Arguments& arguments) {
   }
 }
 
-int run(const Arguments& arguments) {
-  try {
-    perceive(arguments);
-    return kDone;
-  } catch (const std::exception& error) {
-    std::cerr << "perceive: " << arguments.bag << ": " << error.what() << "\n";
-    return kBadInput;
-  }
-}
-
-// A damaged bag can end the process inside the bag library (assertions, reads out of bounds): a process
-// of its own reads it, so that this one can tell.
-int runGuarded(const Arguments& arguments) {
-  const pid_t child = fork();
-  if (child == 0) _exit(run(arguments));
-  int state = 0;
-  if (child < 0 || waitpid(child, &state, 0) != child)
-    throw std::runtime_error("cannot start a process");
-  if (WIFEXITED(state)) return WEXITSTATUS(state);
-  std::cerr << "perceive: " << arguments.bag << ": the bag is damaged: reading it ended with '"
-            << strsignal(WTERMSIG(state)) << "'\n";
-  return kBadInput;
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
-  const rlimit limit{kMemoryLimit, kMemoryLimit};
-  setrlimit(RLIMIT_AS, &limit);
+  tools::limitMemory();
   try {
     Arguments arguments;
-    return parse(argc, argv, arguments) ? runGuarded(arguments) : kDone;
+    if (!parse(argc, argv, arguments)) return tools::kDone;
+    return tools::runGuarded("perceive: " + arguments.bag, [&] {
+      perceive(arguments);
+      return tools::kDone;
+    });
   } catch (const std::exception& error) {
     std::cerr << "perceive: " << error.what() << "\n";
-    return kBadInput;
+    return tools::kBadInput;
   }
 }

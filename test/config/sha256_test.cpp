@@ -12,5 +12,22 @@ TEST(Sha256, MatchesThePublishedExamples) {
             "248d6a61d20638b8e5c026930c3e6039a33ce45964ff2167f6ecedd419db06c1");
 }
 
+TEST(Sha256, PiecesGiveTheHashOfTheWhole) {
+  std::string text;
+  for (int i = 0; i < 300; ++i) {
+    text += static_cast<char>(i);
+    Sha256 pieces;
+    const std::size_t first = text.size() / 3;
+    pieces.update(text.data(), first);
+    pieces.update(text.data() + first, text.size() - first);
+    ASSERT_EQ(pieces.finish(), sha256(text)) << text.size();
+  }
+}
+
+TEST(Sha256, AMillionLettersMatchThePublishedExample) {
+  EXPECT_EQ(sha256(std::string(1'000'000, 'a')),
+            "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
+}
+
 }  // namespace
 }  // namespace tunnel_pilot::config
