@@ -5,9 +5,11 @@
 #include <cstdio>
 #include <exception>
 #include <iostream>
+#include <iterator>
 #include <string>
 #include <vector>
 
+#include "tunnel_pilot/learning/data_file.h"
 #include "tunnel_pilot/learning/recipe.h"
 
 namespace {
@@ -33,6 +35,8 @@ bool parse(int argc, char** argv, Arguments& arguments) {
       "recipe", options::value(&arguments.recipe)->required()->value_name("FILE"),
       "recipe file; also without the option's name")(
       "out", options::value(&arguments.out)->required()->value_name("FILE"), "network file to write")(
+      "data", options::value(&arguments.data)->multitoken()->value_name("FILE..."),
+      "data sets of extract: learns from these instead of the recipe's scenes and drives")(
       "jobs", options::value(&arguments.jobs)->default_value(2)->value_name("N"),
       "threads that drive; the result does not depend on them");
   options::positional_options_description positional;
@@ -52,8 +56,14 @@ bool parse(int argc, char** argv, Arguments& arguments) {
 void train(const Arguments& arguments) {
   const auto start = std::chrono::steady_clock::now();
   const learning::Recipe recipe = learning::loadRecipe(arguments.recipe);
+  learning::DataSet data;
+  for (const std::string& file : arguments.data) {
+    learning::DataSet more = learning::readDataSet(file);
+    data.insert(data.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
+  }
+  const learning::DataSet* recorded = arguments.data.empty() ? nullptr : &data;
   neural::NetworkFile network =
-      learning::follow(recipe, nullptr, arguments.jobs, [&](const std::string& line) {
+      learning::follow(recipe, recorded, arguments.jobs, [&](const std::string& line) {
         const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - start;
         std::printf("%6.0f s  %s\n", passed.count(), line.c_str());
         std::fflush(stdout);
