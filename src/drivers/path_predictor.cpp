@@ -119,7 +119,8 @@ PathState PathPredictor::overDeadTime(const perception::Tunnel& tunnel, const ge
   PathState state{driven.s, driven.offset, driven.heading, motion.articulation, 0.0};
   PathCursor cursor(tunnel.centerline, state.s);
   double heading = cursor.headingAt(state.s);
-  const double known = std::clamp(toSeconds(now - motion.stamp), 0.0, 0.3) + toSeconds(steering_.delay());
+  const double known =
+      std::clamp(toSeconds(now - motion.stamp), 0.0, 0.3) + toSeconds(steering_.delay());
   const double span = std::max(known, kLeastSpan);
   const int steps = std::max(1, static_cast<int>(std::ceil(span / kPredictionStep)));
   const double step = span / steps;

@@ -103,7 +103,7 @@ double PreviewNetwork::run(const PreviewInputs& inputs) {
 }
 
 void PreviewNetwork::learn(double error, double share) {
-  if (!adaptation_.on || !std::isfinite(error)) return;
+  if (!adaptation_.enabled || !std::isfinite(error)) return;
   for (std::size_t j = 0; j < kHidden; ++j) {
     const double step = adaptation_.rate * share * error * hidden_[j];
     const double moment = adaptation_.momentum * (weights_[j] - before_[j]);

@@ -19,7 +19,7 @@ PreviewWeights loadWeights(config::Node node) {
 
 AdaptationParameters loadAdaptation(config::Node node) {
   AdaptationParameters adaptation{};
-  adaptation.on = node.boolean("on");
+  adaptation.enabled = node.boolean("enabled");
   adaptation.rate = node.number("rate", "rad/m", 0.0, 1.0);
   adaptation.momentum = node.number("momentum", "1", 0.0, 0.99);
   adaptation.bound = node.number("bound", "rad", 0.0, 1.0);

@@ -99,10 +99,10 @@ std::vector<float> goldenOutput(const Network& network, const std::vector<float>
 }
 
 std::string domainText(const InputDomain& domain) {
-  return "domain: {meaning: " + quoted(domain.meaning) + ", size: " + std::to_string(domain.mean.size()) +
-         ", limit: " + shortest(domain.limit) + "}\ndomain_mean: |\n" +
-         numberLines({domain.mean.begin(), domain.mean.end()}) + "domain_whitening: |\n" +
-         numberLines({domain.whitening.begin(), domain.whitening.end()});
+  return "domain: {meaning: " + quoted(domain.meaning) +
+         ", size: " + std::to_string(domain.mean.size()) + ", limit: " + shortest(domain.limit) +
+         "}\ndomain_mean: |\n" + numberLines({domain.mean.begin(), domain.mean.end()}) +
+         "domain_whitening: |\n" + numberLines({domain.whitening.begin(), domain.whitening.end()});
 }
 
 std::string fileText(const NetworkFile& file) {

@@ -1,14 +1,13 @@
-// Prints every parameter of the shipped configuration as one JSON list: file, key, value, unit, range. The
-// loaders themselves tell unit and range; scripts/generate_parameter_docs makes the tables from it.
+// Prints every parameter of the shipped configuration as one JSON list: file, key, value, unit, range.
+// The loaders themselves tell unit and range; scripts/generate_parameter_docs makes the tables from it.
 
 #include <exception>
 #include <functional>
 #include <iostream>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
-
-#include <nlohmann/json.hpp>
 
 #include "tunnel_pilot/bridge/bridge_parameters.h"
 #include "tunnel_pilot/config/node.h"
@@ -43,7 +42,8 @@ const std::vector<std::pair<std::string, std::function<void(const config::Node&)
 
 int main(int argc, char** argv) {
   const std::string usage =
-      "parameters CONFIG_FOLDER: prints every parameter as a JSON list of file, key, value, unit and range.\n";
+      "parameters CONFIG_FOLDER: prints every parameter as a JSON list of file, key, value, unit and "
+      "range.\n";
   const std::string argument = argc == 2 ? argv[1] : "";
   if (argument == "--help" || argument == "-h") {
     std::cout << usage;
@@ -59,7 +59,8 @@ int main(int argc, char** argv) {
       const config::Node node = config::loadFile(argument + "/" + name + ".yaml");
       load(node);
       for (const config::ParameterRecord& r : node.records()) {
-        list.push_back({{"file", name}, {"key", r.key}, {"value", r.value}, {"unit", r.unit}, {"range", r.range}});
+        list.push_back(
+            {{"file", name}, {"key", r.key}, {"value", r.value}, {"unit", r.unit}, {"range", r.range}});
       }
     }
     std::cout << list.dump(1) << "\n";

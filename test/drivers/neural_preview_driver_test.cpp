@@ -162,7 +162,7 @@ TEST(NeuralPreviewDriver, ItsCommandNeverMovesFasterThanTheSteering) {
 
 TEST(NeuralPreviewDriver, ForgetsEverythingOnReset) {
   PreviewDriverParameters p = parameters();
-  p.network_law.adaptation.on = true;
+  p.network_law.adaptation.enabled = true;
   NeuralPreviewDriver fresh(p, truck().geometry);
   NeuralPreviewDriver used(p, truck().geometry);
   settled(used, 0.7, 0.02, 0.1);
@@ -194,9 +194,9 @@ TEST(NeuralPreviewDriver, MakesUpForTheSteeringsLag) {
 
 TEST(NeuralPreviewDriver, LearningOverALongNoisyDriveDoesLittleHarm) {
   PreviewDriverParameters p = parameters();
-  p.network_law.adaptation.on = true;
+  p.network_law.adaptation.enabled = true;
   const double learning = laneChange(p, 120.0).rms;
-  p.network_law.adaptation.on = false;
+  p.network_law.adaptation.enabled = false;
   EXPECT_LT(learning, 1.25 * laneChange(p, 120.0).rms);
 }
 

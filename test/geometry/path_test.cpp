@@ -1,8 +1,8 @@
-#include <cmath>
+#include "tunnel_pilot/geometry/path.h"
 
 #include <gtest/gtest.h>
 
-#include "tunnel_pilot/geometry/path.h"
+#include <cmath>
 
 namespace tunnel_pilot::geometry {
 namespace {

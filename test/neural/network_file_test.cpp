@@ -324,8 +324,7 @@ TEST_F(BadNetworkFile, EveryWrongContentIsRefusedWithItsReason) {
 TEST_F(BadNetworkFile, AWrongDomainIsRefusedWithItsReason) {
   const BadFile bad_domains[] = {
       {"domain: {meaning: \"sectors\", size: 2, limit: 7.5}\n", "", "file: 'domain_mean' is unknown"},
-      {"domain_mean: |\n  0.5 -1.25\n", "",
-       "file: 'domain_mean' is missing, or is no block of numbers"},
+      {"domain_mean: |\n  0.5 -1.25\n", "", "file: 'domain_mean' is missing, or is no block of numbers"},
       {"size: 2", "size: 3", "file: domain_mean numbers: only 2 of 3"},
       {"size: 2", "size: 1", "file: domain_mean numbers: more than the 1 that belong here"},
       {"size: 2", "size: 257", "file: 'domain.size' = 257 must be a whole number [1] in [1, 256]"},

@@ -159,9 +159,11 @@ TEST_F(Perceive, ATopicIsFoundWithItsSlashAndWithout) {
 }
 
 TEST_F(Perceive, WhereNoTunnelIsSeenOtherWidthsAreNamed) {
-  EXPECT_EQ(perceive({"--bag", bag(), "--csv", csv()}).output.find("config/corridor"), std::string::npos);
+  EXPECT_EQ(perceive({"--bag", bag(), "--csv", csv()}).output.find("config/corridor"),
+            std::string::npos);
   writeBag(bag(), {"/scan"}, 1, 1.0);
-  EXPECT_NE(perceive({"--bag", bag(), "--csv", csv()}).output.find("config/corridor"), std::string::npos);
+  EXPECT_NE(perceive({"--bag", bag(), "--csv", csv()}).output.find("config/corridor"),
+            std::string::npos);
 }
 
 TEST_F(Perceive, BadInputExitsTwoAndSaysWhy) {

@@ -20,7 +20,7 @@ struct PreviewInputs {
 
 /// How the network learns while it drives (config/preview_driver.yaml).
 struct AdaptationParameters {
-  bool on;
+  bool enabled;
   double rate;      ///< eta of one preview time [rad/m]
   double momentum;  ///< alpha [1]
   double bound;     ///< of a weight's way from its trained value [rad]

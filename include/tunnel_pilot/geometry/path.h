@@ -26,8 +26,8 @@ struct PathProjection {
 
 /// A sampled path (a tunnel's design line, a measured centerline, a planned lane change), with linear
 /// interpolation between samples. s grows strictly; a closed path's first and last sample coincide and s
-/// wraps round. Throws std::invalid_argument for fewer than two points, non-finite numbers or s that does
-/// not grow.
+/// wraps round. Throws std::invalid_argument for fewer than two points, non-finite numbers or s that
+/// does not grow.
 class Path {
  public:
   Path() = default;
@@ -56,8 +56,8 @@ class Path {
   bool closed_ = false;
 };
 
-/// One piece of a design line. Curvature runs linearly from its start to its end value, so that the kinds
-/// are: straight (0, 0), arc (k, k), clothoid (anything else).
+/// One piece of a design line. Curvature runs linearly from its start to its end value, so that the
+/// kinds are: straight (0, 0), arc (k, k), clothoid (anything else).
 struct PathPiece {
   double length = 0.0;           ///< [m], positive
   double curvature_start = 0.0;  ///< [1/m]
@@ -65,8 +65,9 @@ struct PathPiece {
 };
 
 /// Samples a list of pieces every `spacing` [m] (the joints between pieces are always samples), starting
-/// at `start`. The heading is exact; positions are integrated with Gauss-Legendre quadrature (error below
-/// 1e-9 m a metre for curvatures up to 1/m). `closed` only marks the result: use closureGap() to judge it.
+/// at `start`. The heading is exact; positions are integrated with Gauss-Legendre quadrature (error
+/// below 1e-9 m a metre for curvatures up to 1/m). `closed` only marks the result: use closureGap() to
+/// judge it.
 Path buildPath(const std::vector<PathPiece>& pieces, const Pose& start, double spacing,
                bool closed = false);
 

@@ -19,7 +19,7 @@ struct NetworkDesign {
   struct Convolution {
     std::size_t channels, kernel, stride;
   };
-  bool inverse_ranges;                    ///< 1/r instead of r
+  bool inverse_ranges;  ///< 1/r instead of r
   enum class Truck { kNone, kArticulation, kAll };
   Truck truck;                            ///< which of drivers::TruckInputs stand beside the scan
   std::vector<Convolution> convolutions;  ///< over the scan, rectified

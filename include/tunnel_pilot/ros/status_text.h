@@ -31,8 +31,9 @@ struct StatusInput {
 };
 
 /// What an operator wants to read beside the truck: the safety state and mode, the one reason why it
-/// does what it does, who steers and how sure the network is, the speed and what limits it, the distance that is free and the one
-/// that a stop takes, and where the truck is in the tunnel or why that is not known.
+/// does what it does, who steers and how sure the network is, the speed and what limits it, the distance
+/// that is free and the one that a stop takes, and where the truck is in the tunnel or why that is not
+/// known.
 StatusText describe(const StatusInput& input);
 
 }  // namespace tunnel_pilot::shell

@@ -12,9 +12,9 @@ std::string sha256OfFiles(const std::vector<std::string>& files);
 /// What a report was made from.
 struct Fingerprints {
   std::string scenario;
-  std::string controller;  ///< the parameter files of the pilot
-  std::string plant;       ///< those of truck and simulator
-  std::string world;       ///< empty without a world
+  std::string controller;                ///< the parameter files of the pilot
+  std::string plant;                     ///< those of truck and simulator
+  std::string world;                     ///< empty without a world
   std::string driver{"preview_driver"};  ///< who proposed: the name of a DriverChoice
   std::string network{};                 ///< the lidar driver's; empty without
 };

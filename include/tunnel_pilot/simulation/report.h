@@ -44,7 +44,8 @@ Evaluation judge(const Scenario& scenario, const std::vector<EpisodeResult>& epi
 /// Console table: metric, paper, goal, median, worst, verdict.
 std::string table(const Scenario& scenario, const Evaluation& evaluation);
 
-/// Makes the folder that a report shall go to. Throws std::runtime_error when nothing can be written there.
+/// Makes the folder that a report shall go to. Throws std::runtime_error when nothing can be written
+/// there.
 void makeReportFolder(const std::string& folder);
 
 /// Writes summary.json, episodes.csv, one CSV per episode, and plots of the median and the worst episode

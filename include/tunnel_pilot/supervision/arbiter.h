@@ -195,7 +195,7 @@ class Arbiter {
   SteeringMonitor steering_monitor_;
   drivers::MotionHistory history_;
 
-  std::array<Slot, 9> slots_;  ///< by Source
+  std::array<Slot, 9> slots_;            ///< by Source
   std::optional<Stamp> disagree_since_;  ///< lidar and preview driver
   perception::Walls walls_;
   std::vector<geometry::Point> points_;

@@ -23,36 +23,36 @@ enum class Source : std::uint8_t {
   kHold = 8,           ///< a stop that holds the articulation
 };
 
-/// Why the truck does what it does: one code wins, the gravest first reason found. Numbers are part of the
-/// contract (message, CAN, logs) and never reused.
+/// Why the truck does what it does: one code wins, the gravest first reason found. Numbers are part of
+/// the contract (message, CAN, logs) and never reused.
 enum class Reason : std::uint8_t {
-  kNone = 0,                 ///< driving as asked
-  kNotEngaged = 1,           ///< nobody engaged the pilot
+  kNone = 0,        ///< driving as asked
+  kNotEngaged = 1,  ///< nobody engaged the pilot
   kOperatorStop = 2,
   kOperatorRelease = 3,
-  kNoSource = 4,             ///< no healthy source of steering
+  kNoSource = 4,  ///< no healthy source of steering
   kSourceStale = 5,
-  kProposalInvalid = 6,      ///< non-finite or out of range
+  kProposalInvalid = 6,  ///< non-finite or out of range
   kTunnelInvalid = 7,
   kScanStale = 8,
   kScanRejected = 9,
-  kMotionStale = 10,         ///< odometry or articulation feedback too old
-  kTrackingError = 11,       ///< articulation does not follow its command
-  kClearance = 12,           ///< swept width leaves less than the margin
-  kObstacle = 13,            ///< free distance shorter than the stopping distance
+  kMotionStale = 10,    ///< odometry or articulation feedback too old
+  kTrackingError = 11,  ///< articulation does not follow its command
+  kClearance = 12,      ///< swept width leaves less than the margin
+  kObstacle = 13,       ///< free distance shorter than the stopping distance
   kClockJump = 14,
-  kCommandStale = 15,        ///< the bridge got no fresh command
-  kFeedbackStale = 16,       ///< the bridge got no fresh frames from the truck
-  kFeedbackCorrupt = 17,     ///< CRC or counter of feedback wrong
+  kCommandStale = 15,     ///< the bridge got no fresh command
+  kFeedbackStale = 16,    ///< the bridge got no fresh frames from the truck
+  kFeedbackCorrupt = 17,  ///< CRC or counter of feedback wrong
   kBusFault = 18,
-  kTruckFault = 19,          ///< the truck's controller reports a fault
+  kTruckFault = 19,  ///< the truck's controller reports a fault
   kOperatorOverride = 20,
-  kLimitsHit = 21,           ///< angle or lateral acceleration limited again and again
+  kLimitsHit = 21,  ///< angle or lateral acceleration limited again and again
   kStartUp = 22,
   kScanFrozen = 23,
   kSpeedImplausible = 24,
-  kLowConfidence = 25,       ///< a driver is less sure than its rule asks for
-  kDriversDisagree = 26,     ///< two drivers ask for different articulations
+  kLowConfidence = 25,    ///< a driver is less sure than its rule asks for
+  kDriversDisagree = 26,  ///< two drivers ask for different articulations
 };
 
 std::string toString(Mode mode);

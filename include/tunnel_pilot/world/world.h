@@ -38,7 +38,8 @@ struct World {
                                ///< out [m]; empty where it is the nominal one throughout
   geometry::Pose start;        ///< where a truck's front axle is put
 
-  /// Distance between the walls beside the design line's station `s` [m], interpolated, without roughness.
+  /// Distance between the walls beside the design line's station `s` [m], interpolated, without
+  /// roughness.
   double widthAt(double s) const;
 };
 
