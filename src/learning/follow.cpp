@@ -37,6 +37,7 @@ class Cook {
         tell_(tell),
         setup_(simulation::loadSetup(simulation::loadScenario(recipe.base_scenario))),
         file_(makeNetwork(recipe.design, recipe.name)) {
+    file_.network.randomise(recipe.seed);
     setup_.pilot.preview_driver.weights = recipe.teacher;
     setup_.pilot.driver = simulation::DriverChoice::kLidarDriver;
     // An unsure beginner shall go on, to be shown better.

@@ -244,6 +244,20 @@ TEST(Recipe, ASmallOneIsFollowedToTheSameNetworkWithAnyNumberOfThreads) {
   EXPECT_NE(one.training.find("small_recipe"), std::string::npos);
 }
 
+TEST(Recipe, AConvolutionBeginsFromRandomWeightsAndLearns) {
+  Recipe recipe = loadRecipe(kSource + "/test/learning/small_recipe.yaml");
+  recipe.design.convolutions = {{4, 9, 8}, {4, 5, 4}};
+  recipe.rounds = 0;
+  recipe.training.epochs = 20;
+  std::vector<std::string> told;
+  const neural::NetworkFile network =
+      follow(recipe, nullptr, 2, [&](const std::string& line) { told.push_back(line); });
+  const double first = std::stod(told[1].substr(told[1].find("loss ") + 5));
+  const double last = std::stod(told.back().substr(told.back().find("loss ") + 5));
+  EXPECT_LT(last, 0.6 * first);
+  EXPECT_NE(network.network.parameters()[0], 0.0);
+}
+
 TEST(Recipe, ASmallOneTeachesTheNetworkToSteerBack) {
   const Recipe recipe = loadRecipe(kSource + "/test/learning/small_recipe.yaml");
   std::vector<std::string> told;
