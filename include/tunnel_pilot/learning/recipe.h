@@ -51,7 +51,6 @@ struct DriveSource {
 struct Recipe {
   std::string file;
   std::string name;
-  std::string config_folder;
   std::string base_scenario;  ///< its plant and parameters are those of the scenes
   std::uint64_t seed;
   NetworkDesign design;
