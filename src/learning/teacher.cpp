@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 
 #include "tunnel_pilot/drivers/path_cursor.h"
 #include "tunnel_pilot/drivers/path_model.h"
@@ -36,8 +35,7 @@ double Teacher::command(const geometry::Path& line, const TruckBesideLine& truck
   const double speed = std::max(truck.speed, parameters_.planning_speed);
   planner_.reset();
   for (int i = 0; i < kSweeps; ++i) planner_.plan(start, line, speed, believed, 0.0);
-  static const double ahead = std::getenv("AHEAD") ? std::atof(std::getenv("AHEAD")) : 1.0;
-  return planner_.plannedAt(ahead * parameters_.truck.steering.lag).command;
+  return planner_.plannedAt(parameters_.truck.steering.lag).command;
 }
 
 TruckBesideLine Teacher::movedOn(const geometry::Path& line, const TruckBesideLine& truck,
