@@ -15,12 +15,13 @@ namespace {
 using neural::InputGroup;
 
 // The members of TruckInputs by the names that a network's file gives them.
-constexpr std::array<std::pair<const char*, double TruckInputs::*>, 5> kTruckInputs = {{
+constexpr std::array<std::pair<const char*, double TruckInputs::*>, 6> kTruckInputs = {{
     {"articulation", &TruckInputs::articulation},
     {"articulation_ahead", &TruckInputs::articulation_ahead},
     {"speed", &TruckInputs::speed},
     {"yaw_gain", &TruckInputs::yaw_gain},
     {"yaw_disturbance", &TruckInputs::yaw_disturbance},
+    {"steering_rate", &TruckInputs::steering_rate},
 }};
 
 double TruckInputs::*memberOf(const std::string& meaning) {
@@ -86,7 +87,7 @@ bool LidarInputs::fill(const std::vector<float>& ranges, const TruckInputs& truc
 
 void LidarInputs::fillMirrored(float* inputs) const {
   const TruckInputs mirrored{-truck_.articulation, -truck_.articulation_ahead, truck_.speed,
-                             truck_.yaw_gain, -truck_.yaw_disturbance};
+                             truck_.yaw_gain, -truck_.yaw_disturbance, truck_.steering_rate};
   write(inverse_.rbegin(), inverse_.rend(), mirrored, inputs);
 }
 
@@ -149,7 +150,7 @@ LidarDriver::Refusal LidarDriver::steer(const geometry::Scan& scan, const Motion
   steering_.observe(motion);
   const double meets = steering_.articulationAhead(now);
   truck_ = {steering_.motion().articulation, meets, motion.speed, steering_.learned().gain,
-            steering_.learned().disturbance};
+            steering_.learned().disturbance, steering_.maxRate()};
   if (!inputs_.fill(scan.ranges, truck_, values_.data())) return Refusal::kScan;
   const Refusal refused = ask(now);
   if (refused != Refusal::kNone) return refused;

@@ -72,6 +72,7 @@ std::optional<PathState> PathPredictor::predict(const perception::Tunnel& tunnel
   if (!scan_pose) return std::nullopt;
   const Errors errors = filterErrors(tunnel, *scan_pose);
   steering_.observe(motion);
+  truck_.max_rate = steering_.maxRate();
   return overDeadTime(tunnel, *scan_pose, errors, steering_.motion(), now);
 }
 

@@ -23,6 +23,7 @@ Proposal PreviewDriver::propose(const perception::Tunnel& tunnel, const Motion& 
 
   const double elapsed = predictor_.elapsed(now);
   const double speed = std::max(motion.speed, parameters_.planning_speed);
+  planner_.setMaxRate(predictor_.truck().max_rate);
   const double rate = planner_.plan(*start, tunnel.centerline, speed, predictor_.learned(), elapsed);
 
   proposal.valid = true;

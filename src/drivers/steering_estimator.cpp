@@ -11,6 +11,8 @@ namespace {
 constexpr double kLongestPause = 0.1;     // [s] a command moves no further than in this time
 constexpr double kPredictionStep = 0.03;  // [s]
 constexpr double kSteady = 0.01;          // [rad] nearer to its command, the articulation stands
+constexpr double kOutOfReach = 0.85;      // [1] of max_rate * lag: the articulation turns at its fastest
+constexpr double kSettling = 0.25;        // [s] that it then takes to be at that rate
 // How fast a reversing command crosses the valve's dead band, in its own movements.
 constexpr double kDeadBandGain = 2.0;
 
@@ -29,6 +31,10 @@ SteeringEstimatorParameters loadSteeringEstimator(config::Node& node) {
   p.max_rate = steering.number("max_rate", "rad/s", 0.01, 2.0);
   p.max_articulation = steering.number("max_articulation", "rad", 0.1, 1.2);
   steering.finish();
+  config::Node fastest = node.child("fastest_rate");
+  p.rate_time = fastest.number("time", "s", 0.05, 100.0);
+  p.rate_change = fastest.number("slower", "1", 0.0, 0.5);
+  fastest.finish();
   config::Node bias = node.child("articulation_bias");
   p.bias_time = bias.number("time", "s", 0.1, 100.0);
   p.max_bias = bias.number("max", "rad", 0.0, 0.1);
@@ -47,12 +53,14 @@ SteeringEstimatorParameters loadSteeringEstimator(config::Node& node) {
 
 SteeringEstimator::SteeringEstimator(const SteeringEstimatorParameters& parameters,
                                      const vehicle::TruckGeometry& geometry)
-    : parameters_(parameters), yaw_(parameters.yaw, geometry) {}
+    : parameters_(parameters), yaw_(parameters.yaw, geometry), max_rate_(parameters.max_rate) {}
 
 void SteeringEstimator::reset() {
   last_time_.reset();
   last_motion_.reset();
   yaw_.reset();
+  max_rate_ = parameters_.max_rate;
+  out_of_reach_ = 0.0;
   bias_ = 0.0;
   play_ = 0.0;
 }
@@ -64,7 +72,9 @@ void SteeringEstimator::observe(const Motion& motion) {
   if (passed > kLongestPause) dropCommands(motion.articulation);
   last_motion_ = motion;
 
-  const double moving = commandActing(motion.stamp) - commanded_articulation_;
+  const double acting = commandActing(motion.stamp);
+  learnMaxRate(acting - motion.articulation + bias_, passed);
+  const double moving = acting - commanded_articulation_;
   commanded_articulation_ += gain(passed, parameters_.lag) * moving;
   if (std::abs(moving) < kSteady) {
     const double deviation = motion.articulation - commanded_articulation_;
@@ -75,13 +85,26 @@ void SteeringEstimator::observe(const Motion& motion) {
   yaw_.update(*last_motion_, passed);
 }
 
+// Only towards a command that stays out of reach does the articulation show how fast it can turn. A truck
+// that could turn faster than believed is not asked to.
+void SteeringEstimator::learnMaxRate(double lead, double passed) {
+  const double rate = std::copysign(1.0, lead) * last_motion_->articulation_rate;
+  const bool far = std::abs(lead) > kOutOfReach * max_rate_ * parameters_.lag && rate > 0.0;
+  const bool fast = last_motion_->speed >= parameters_.yaw.least_speed;  // at rest the engine idles
+  out_of_reach_ = far && fast ? out_of_reach_ + passed : 0.0;
+  if (out_of_reach_ < kSettling) return;
+  max_rate_ += gain(passed, parameters_.rate_time) * (rate - max_rate_);
+  const double slowest = (1.0 - parameters_.rate_change) * parameters_.max_rate;
+  max_rate_ = std::clamp(max_rate_, slowest, parameters_.max_rate);
+}
+
 double SteeringEstimator::articulationAhead(Stamp now) const {
   double articulation = last_motion_->articulation;
   const double span = std::clamp(toSeconds(now - last_motion_->stamp), 0.0, 0.3) + toSeconds(delay());
   const int steps = std::max(1, static_cast<int>(std::ceil(span / kPredictionStep)));
   const double step = span / steps;
   const double share = lagShare(step, parameters_.lag);
-  const double most = parameters_.max_rate * step;
+  const double most = max_rate_ * step;
   for (int i = 0; i < steps; ++i) {
     const double command = commandActing(last_motion_->stamp + fromSeconds((i + 0.5) * step));
     articulation += std::clamp(share * (command - articulation), -most, most);

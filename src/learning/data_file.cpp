@@ -17,7 +17,7 @@ namespace {
 using config::ConfigError;
 
 constexpr const char* kFormat = "tunnel_pilot_data_set";
-constexpr std::int64_t kVersion = 1;
+constexpr std::int64_t kVersion = 2;
 constexpr std::size_t kBeams = drivers::LidarInputs::kBeams;
 constexpr std::size_t kMaxHeader = 4096;  // [bytes]
 // No header is deeper than a map of a list of maps: deeper nesting would only fill the parser's stack.
@@ -29,12 +29,13 @@ struct Field {
   const char* unit;
   float Example::*member;
 };
-constexpr std::array<Field, 6> kFields = {{
+constexpr std::array<Field, 7> kFields = {{
     {"articulation", "rad", &Example::articulation},
     {"articulation_ahead", "rad", &Example::articulation_ahead},
     {"speed", "m/s", &Example::speed},
     {"yaw_gain", "1", &Example::yaw_gain},
     {"yaw_disturbance", "1/m", &Example::yaw_disturbance},
+    {"steering_rate", "rad/s", &Example::steering_rate},
     {"label", "rad", &Example::label},
 }};
 constexpr std::size_t kWords = kBeams + kFields.size() + 1;

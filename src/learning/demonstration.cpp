@@ -44,7 +44,7 @@ DemonstrationParameters demonstrationParameters(const drivers::SteeringEstimator
   constexpr double kLeastSpeed = 0.5;
   const double acts_after = steering.transport_delay + steering.dead_time;
   return {scan_delay,   acts_after,  scan_delay + acts_after + steering.lag,
-          steering.lag, kLeastSpeed, steering.yaw};
+          steering.lag, kLeastSpeed, steering.max_rate, steering.yaw};
 }
 
 Demonstration::Demonstration(const DemonstrationParameters& parameters,
@@ -191,6 +191,7 @@ std::optional<Lesson> Demonstration::lessonOf(Pending& pending) const {
   lesson.example.speed = static_cast<float>(now->motion.speed);
   lesson.example.yaw_gain = static_cast<float>(now->yaw.gain);
   lesson.example.yaw_disturbance = static_cast<float>(now->yaw.disturbance);
+  lesson.example.steering_rate = static_cast<float>(parameters_.max_rate);
   lesson.example.label = static_cast<float>(label->motion.articulation);
   correct(pending.stamp, lesson);
   return lesson;

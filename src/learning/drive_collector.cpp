@@ -34,6 +34,7 @@ void DriveCollector::afterScan(const simulation::Simulator& simulator, const sim
   example.speed = static_cast<float>(truck.speed);
   example.yaw_gain = static_cast<float>(truck.yaw_gain);
   example.yaw_disturbance = static_cast<float>(truck.yaw_disturbance);
+  example.steering_rate = static_cast<float>(truck.steering_rate);
   example.tunnel = tunnel_;
   pending_.push_back({simulator.now() + delay_, std::move(example)});
 }
@@ -53,6 +54,7 @@ void DriveCollector::afterTruth(const simulation::Simulator& simulator) {
     Example& example = pending.example;
     const drivers::YawResponse believed{static_cast<double>(example.yaw_gain),
                                         static_cast<double>(example.yaw_disturbance)};
+    teacher_.setMaxRate(static_cast<double>(example.steering_rate));
     const double share = toSeconds(pending.due - last_stamp_) / toSeconds(truth.stamp - last_stamp_);
     example.label = static_cast<float>(
         teacher_.command(simulator.world().design_line, between(*last_, now, share), believed));

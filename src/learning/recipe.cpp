@@ -148,6 +148,7 @@ neural::NetworkFile makeNetwork(const NetworkDesign& design, const std::string& 
     inputs.push_back(truckInput("speed", "m/s", 3.0, 2.0, 0.0, 10.0));
     inputs.push_back(truckInput("yaw_gain", "1", 1.0, 0.2, 0.5, 1.5));
     inputs.push_back(truckInput("yaw_disturbance", "1/m", 0.0, 0.006, -0.02, 0.02));
+    inputs.push_back(truckInput("steering_rate", "rad/s", 0.25, 0.05, 0.1, 0.5));
   }
   const std::size_t passed = inputs.size() - 1;
   std::vector<Layer> layers;

@@ -56,6 +56,9 @@ class Sampler {
       const drivers::YawResponse response{random_.uniform(spread_.gain_min, spread_.gain_max),
                                           spreadOut(random_, spread_.disturbance)};
       const double lean = spreadOut(random_, spread_.lean);
+      const double fastest = setup_.pilot.preview_driver.truck.steering.max_rate;
+      steering_rate_ = fastest * (1.0 - random_.uniform(0.0, spread_.slower));
+      teacher_.setMaxRate(steering_rate_);
       for (int i = 0; i < kMoments && inside(truck); ++i) {
         std::optional<Example> example = look(truck, response);
         if (!example) break;
@@ -120,6 +123,7 @@ class Sampler {
     example.speed = static_cast<float>(speed_.measure(truck.speed, 0.02));
     example.yaw_gain = static_cast<float>(response.gain);
     example.yaw_disturbance = static_cast<float>(response.disturbance);
+    example.steering_rate = static_cast<float>(steering_rate_);
     example.label = static_cast<float>(teacher_.command(line_, then, response));
     example.tunnel = static_cast<std::uint32_t>(seed_);
     if (!std::isfinite(example.label)) return std::nullopt;
@@ -141,6 +145,7 @@ class Sampler {
   simulation::Sensor articulation_;
   simulation::Sensor speed_;
   std::uint64_t seed_;
+  double steering_rate_ = 0.0;  // of the truck put there [rad/s]
   Stamp stamp_{};
 };
 

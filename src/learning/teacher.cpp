@@ -26,6 +26,11 @@ Teacher::Teacher(const drivers::PreviewDriverParameters& parameters, const vehic
       response_(response(parameters, truck)),
       planner_(response_, parameters.weights, parameters.step) {}
 
+void Teacher::setMaxRate(double rate) {
+  response_.max_rate = rate;
+  planner_.setMaxRate(rate);
+}
+
 double Teacher::command(const geometry::Path& line, const TruckBesideLine& truck,
                         const drivers::YawResponse& believed) {
   const double demand = truck.articulation + parameters_.truck.steering.lag * truck.articulation_rate;
@@ -56,7 +61,7 @@ TruckBesideLine Teacher::moved(const geometry::Path& line, const TruckBesideLine
   drivers::PathState state{truck.station, truck.offset, truck.heading_error, truck.articulation, 0.0};
   const int steps = std::max(1, static_cast<int>(std::ceil(time / kMoveStep)));
   const double step = time / steps;
-  const double rate = std::clamp(truck.articulation_rate, -steering.max_rate, steering.max_rate);
+  const double rate = std::clamp(truck.articulation_rate, -response_.max_rate, response_.max_rate);
   const double share = drivers::lagShare(step, response_.lag);
   drivers::PathCursor cursor(line, state.s);
   double heading = cursor.headingAt(state.s);

@@ -18,7 +18,7 @@ namespace tunnel_pilot::learning {
 namespace {
 
 constexpr std::size_t kBeams = drivers::LidarInputs::kBeams;
-constexpr std::size_t kRecord = 4 * (kBeams + 7);  // [bytes]
+constexpr std::size_t kRecord = 4 * (kBeams + 8);  // [bytes]
 const float kNan = std::numeric_limits<float>::quiet_NaN();
 const float kInfinity = std::numeric_limits<float>::infinity();
 
@@ -161,7 +161,8 @@ TEST_F(DataFile, BadFilesAreRefusedWithTheReason) {
       {withValue(kBeams + 2, kNan), "'speed'"},
       {withValue(kBeams + 3, kNan), "'yaw_gain'"},
       {withValue(kBeams + 4, -kInfinity), "'yaw_disturbance'"},
-      {withValue(kBeams + 5, kNan), "'label'"},
+      {withValue(kBeams + 5, kNan), "'steering_rate'"},
+      {withValue(kBeams + 6, kNan), "'label'"},
   };
   for (const auto& [content, told] : cases) {
     const std::string complaint = complaintAbout(content);

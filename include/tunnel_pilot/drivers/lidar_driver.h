@@ -35,6 +35,7 @@ struct TruckInputs {
   double speed = 0.0;               ///< [m/s]
   double yaw_gain = 1.0;            ///< g of YawObserver [1]
   double yaw_disturbance = 0.0;     ///< d of YawObserver [1/m]
+  double steering_rate = 0.25;      ///< SteeringEstimator::maxRate() [rad/s]
 };
 
 /// Reads and checks config/lidar_driver.yaml; a relative file name is looked for from `folder`. Throws

@@ -46,7 +46,7 @@ class PathPredictor {
   double elapsed(Stamp now) const { return steering_.elapsed(now); }  ///< since the last command [s]
   double footPoint() const { return last_errors_.s; }  ///< of the last scan on its centerline [m]
   YawResponse learned() const { return steering_.learned(); }
-  const TruckResponse& truck() const { return truck_; }
+  const TruckResponse& truck() const { return truck_; }  ///< max_rate as learned
 
  private:
   struct Errors {

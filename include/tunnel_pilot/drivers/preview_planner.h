@@ -46,6 +46,8 @@ class PreviewPlanner {
               const YawResponse& believed, double elapsed);
   void reset();
 
+  void setMaxRate(double rate) { truck_.max_rate = rate; }  ///< for the plans to come [rad/s]
+
   double cost() const { return cost_; }  ///< of the last plan
   /// The planned state `time` [s] after the last plan's start, interpolated; clamped to the horizon.
   PathState plannedAt(double time) const;

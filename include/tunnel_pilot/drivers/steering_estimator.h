@@ -20,17 +20,20 @@ struct SteeringEstimatorParameters {
   double lead;              ///< of the command before the articulation it will meet, at most [rad]
   double max_rate;          ///< of the steering [rad/s]
   double max_articulation;  ///< highest command [rad]
+  double rate_time;         ///< memory of the fastest rate [s]
+  double rate_change;       ///< by which the fastest rate may be below max_rate [1]
   double bias_time;         ///< memory of the articulation sensor's bias [s]
   double max_bias;          ///< [rad]
   YawObserverParameters yaw;
 };
 
-/// Reads the maps `steering`, `bias` and `yaw_response` of a driver's file. Throws config::ConfigError.
+/// Reads the maps `steering`, `fastest_rate`, `articulation_bias` and `yaw_response` of a driver's file. Throws config::ConfigError.
 SteeringEstimatorParameters loadSteeringEstimator(config::Node& node);
 
 /// Keeps the commands that a driver gives and knows what they come to:
-/// 1. learns the articulation sensor's bias against standing commands, and how the truck's yaw rate
-///    answers the articulation (YawObserver);
+/// 1. learns the articulation sensor's bias against standing commands, how fast the articulation turns
+///    where its command is out of reach, and how the truck's yaw rate answers the articulation
+///    (YawObserver);
 /// 2. tells which command acts at a time, after transport delay and dead time, and what articulation the
 ///    truck will have when a command given now begins to act.
 /// Never throws, allocates nothing.
@@ -61,6 +64,7 @@ class SteeringEstimator {
   double elapsed(Stamp now) const;
   Stamp delay() const;  ///< from a command given to the valve's answer
   YawResponse learned() const { return yaw_.response(); }
+  double maxRate() const { return max_rate_; }  ///< the fastest the articulation turns, as learned [rad/s]
 
   void reset();
 
@@ -71,6 +75,7 @@ class SteeringEstimator {
   };
 
   double commandGivenBefore(Stamp time) const;
+  void learnMaxRate(double lead, double passed);
   void dropCommands(double articulation);
 
   SteeringEstimatorParameters parameters_;
@@ -80,6 +85,8 @@ class SteeringEstimator {
   std::optional<Stamp> last_time_;       ///< of the last command
   std::optional<Motion> last_motion_;    ///< its articulation freed of the bias
   double commanded_articulation_ = 0.0;  ///< what the commands given should have made of it by now [rad]
+  double max_rate_;                      ///< learned [rad/s]
+  double out_of_reach_ = 0.0;            ///< time that the command has been so far ahead [s]
   double bias_ = 0.0;                    ///< of the measured articulation against the commands [rad]
   double play_ = 0.0;                    ///< added to the command to cross the dead band [rad]
 };

@@ -16,6 +16,7 @@ struct Example {
   float speed = 0.0F;               ///< measured [m/s]
   float yaw_gain = 1.0F;            ///< g [1]
   float yaw_disturbance = 0.0F;     ///< d [1/m]
+  float steering_rate = 0.25F;      ///< the fastest the articulation turns [rad/s]
   float label = 0.0F;               ///< articulation to demand [rad]
   std::uint32_t tunnel = 0;         ///< it was driven in: examples of one tunnel stay together
 };
@@ -23,7 +24,7 @@ struct Example {
 inline drivers::TruckInputs truckInputsOf(const Example& example) {
   return {static_cast<double>(example.articulation), static_cast<double>(example.articulation_ahead),
           static_cast<double>(example.speed), static_cast<double>(example.yaw_gain),
-          static_cast<double>(example.yaw_disturbance)};
+          static_cast<double>(example.yaw_disturbance), static_cast<double>(example.steering_rate)};
 }
 
 using DataSet = std::vector<Example>;

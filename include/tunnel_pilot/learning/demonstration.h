@@ -20,6 +20,7 @@ struct DemonstrationParameters {
   double label_after;  ///< a scan's stamp, until the articulation shows what was demanded for it [s]
   double lag;          ///< of the articulation behind its command, first order [s]
   double least_speed;  ///< slower, nothing is taught, nor in reverse [m/s]
+  double max_rate;     ///< that the articulation is believed to reach [rad/s]
   drivers::YawObserverParameters yaw;
 };
 

@@ -20,6 +20,7 @@ struct SceneSpread {
   double speed_min = 2.0, speed_max = 3.2;  ///< [m/s]
   double gain_min = 0.7, gain_max = 1.25;   ///< yaw gain g [1]
   double disturbance = 0.006;               ///< d, largest [1/m]
+  double slower = 0.25;                     ///< than its steering's max_rate, at most [1]
   double bias_error = 0.5;                  ///< share of the articulation sensor's bias not learned
   double ahead_error = 0.005;               ///< of the articulation foretold, standard deviation [rad]
 };

@@ -26,6 +26,9 @@ class Teacher {
  public:
   Teacher(const drivers::PreviewDriverParameters& parameters, const vehicle::TruckGeometry& truck);
 
+  /// The fastest that the articulation turns, from now on [rad/s].
+  void setMaxRate(double rate);
+
   /// Articulation to demand [rad].
   double command(const geometry::Path& line, const TruckBesideLine& truck,
                  const drivers::YawResponse& believed);
