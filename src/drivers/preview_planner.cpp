@@ -101,7 +101,7 @@ double PreviewPlanner::roll(const PathState& now, const geometry::Path& path, do
       const Vector change(state.offset - before.offset, state.heading_error - before.heading_error,
                           state.articulation - before.articulation, state.command - before.command);
       rates_[k] = std::clamp(nominal_rates_[k] + correction * corrections_[k] + gains_[k].dot(change),
-                             -rateLimit(k), rateLimit(k));
+                             -rateLimit(k, speed), rateLimit(k, speed));
     }
     const double cosine = std::cos(state.heading_error);
     const double ahead = std::max(least_step, speed * step_ * cosine);
@@ -139,7 +139,8 @@ void PreviewPlanner::sweep(double speed, const YawResponse& believed) {
     const double bend = rate_weight + linear.rate.dot(by_rate);
     const Vector mixed = linear.state.transpose() * by_rate;
     const double free_correction = -slope / bend;
-    corrections_[k] = std::clamp(free_correction, -rateLimit(k) - rates_[k], rateLimit(k) - rates_[k]);
+    const double limit = rateLimit(k, speed);
+    corrections_[k] = std::clamp(free_correction, -limit - rates_[k], limit - rates_[k]);
     const bool clamped = corrections_[k] != free_correction;
     gains_[k] = clamped ? Vector::Zero().eval() : (-mixed / bend).eval();
 

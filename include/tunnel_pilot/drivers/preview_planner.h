@@ -16,13 +16,14 @@ struct PreviewWeights {
   double slope;        ///< of the command's change over the way driven [m^2/rad^2]
   double slope_speed;  ///< lowest v that the slope is counted with [m/s]
   double terminal;     ///< factor on offset and heading at the horizon's end [1]
-  double rate_share;   ///< of max_rate that is planned with late in the horizon [1]
+  double rate_share;   ///< of max_rate that is planned with late in the horizon, up to slope_speed [1]
 };
 
 /// Optimal preview: finds the command rates w over the horizon that minimise
 ///   sum of  q_y e_y^2 + q_psi (e_psi + beta)^2 + r (w / max(v, v_0))^2
 /// along the previewed path, under |w| <= max_rate (later in the horizon less, which leaves room for
-/// what the model does not know), for the truck's exact kinematics
+/// what the model does not know, and beyond v_0 no more a metre than at v_0: a truck that comes faster
+/// slows down before a bend that needs more), for the truck's exact kinematics
 ///   theta_dot = (g v sin(gamma) + l_r gamma_dot) / (l_f cos(gamma) + l_r) + v d
 ///   e_psi_dot = theta_dot - v kappa cos(e_psi) / (1 - kappa e_y)
 ///   beta      = -v theta_dot / (g_0 C) + (g - 1) tan(gamma / 2)
@@ -71,8 +72,9 @@ class PreviewPlanner {
     const double v = std::max(speed, weights_.slope_speed);
     return weights_.slope / (v * v);
   }
-  double rateLimit(std::size_t stage) const {
-    return truck_.max_rate * std::max(weights_.rate_share, 1.0 - 0.10 * static_cast<double>(stage));
+  double rateLimit(std::size_t stage, double speed) const {
+    const double late = weights_.rate_share * std::max(1.0, speed / weights_.slope_speed);
+    return truck_.max_rate * std::max(late, 1.0 - 0.10 * static_cast<double>(stage));
   }
   /// Heading error with which the course follows a path of this curvature despite the slip [rad].
   double courseOffset(double speed, double curvature, const YawResponse& believed) const;
