@@ -73,7 +73,8 @@ class PreviewPlanner {
     return weights_.slope / (v * v);
   }
   double rateLimit(std::size_t stage, double speed) const {
-    const double late = weights_.rate_share * std::max(1.0, speed / weights_.slope_speed);
+    const double faster = std::max(1.0, speed / weights_.slope_speed);
+    const double late = weights_.rate_share * faster * faster;
     return truck_.max_rate * std::max(late, 1.0 - 0.10 * static_cast<double>(stage));
   }
   /// Heading error with which the course follows a path of this curvature despite the slip [rad].
