@@ -127,6 +127,7 @@ void Arbiter::clockJumped() {
   last_.reset();
   hits_ = 0;
   obstructed_scans_ = 0;
+  obstacle_scans_ = 0;
 }
 
 // ---- findings
@@ -289,7 +290,8 @@ Arbiter::Findings Arbiter::assess(Stamp now) const {
   assessTruck(now, findings);
   assessSources(now, findings);
   assessConfidence(now, findings);
-  if (obstructed_scans_ >= parameters_.obstacle_scans) findings.stopFor(obstruction_);
+  if (obstacle_scans_ >= parameters_.obstacle_scans) findings.stopFor(Reason::kObstacle);
+  if (obstructed_scans_ >= parameters_.wall_scans) findings.stopFor(obstruction_);
   if (hits_ >= parameters_.limit_hits) findings.slowFor(Reason::kLimitsHit);
   return findings;
 }
@@ -395,8 +397,10 @@ void Arbiter::updateCorridor(double commanded, Stamp now) {
   const double needed =
       envelope_.stoppingDistance(std::abs(motion.speed)) + parameters_.envelope.reserve;
   const bool obstructed = result.free_until != Envelope::End::kSight && result.free_distance < needed;
+  const bool by_wall = result.free_until == Envelope::End::kWall;
   obstructed_scans_ = obstructed ? obstructed_scans_ + 1 : 0;
-  obstruction_ = result.free_until == Envelope::End::kWall ? Reason::kClearance : Reason::kObstacle;
+  obstacle_scans_ = obstructed && !by_wall ? obstacle_scans_ + 1 : 0;
+  obstruction_ = by_wall ? Reason::kClearance : Reason::kObstacle;
 }
 
 void Arbiter::tellCorridor() {

@@ -20,6 +20,7 @@ constexpr double kMemoryStep = 0.5;        // [m] driven between remembered wall
 constexpr double kMemoryReach = 12.0;      // [m] from base_link: beyond the tail
 constexpr double kLongestWallPiece = 3.0;  // [m] a longer gap is not bridged
 constexpr double kSlowest = 0.5;           // [m/s] for the steering's slope over the way
+constexpr double kOnWall = 0.20;           // [m] a return nearer to the wall's curve is the rough wall's
 
 Point leftOf(const Point& d) { return {-d.y(), d.x()}; }
 
@@ -282,6 +283,7 @@ void Envelope::findObstacles(const std::vector<Point>& points) {
   Point last(kInfinity, kInfinity);
   Point last_inside(kInfinity, kInfinity);
   int run = 0;
+  bool run_on_wall = true;
   double run_s = kInfinity;
   for (const Point& point : points) {
     if (!((point - last).squaredNorm() >= apart * apart)) continue;  // also NaN
@@ -292,9 +294,16 @@ void Envelope::findObstacles(const std::vector<Point>& points) {
     const bool joined = (point - last_inside).squaredNorm() < together * together;
     run = joined ? run + 1 : 1;
     run_s = joined ? std::min(run_s, place.s) : place.s;
+    run_on_wall = (run_on_wall || !joined) && onWall(place);
     last_inside = point;
-    if (run >= parameters_.obstacle_points) endFreeSpace(run_s, End::kObstacle);
+    if (run < parameters_.obstacle_points) continue;
+    endFreeSpace(run_s, run_on_wall ? End::kWall : End::kObstacle);
   }
+}
+
+bool Envelope::onWall(const Beside& place) const {
+  const Station& station = stations_[place.station];
+  return place.lateral > station.wall_left - kOnWall || place.lateral < station.wall_right + kOnWall;
 }
 
 bool Envelope::inCorridor(const Beside& place) const {

@@ -44,6 +44,7 @@ struct ArbiterParameters {
   double recovery_time;         ///< of health before driving fast again [s]
   double degraded_speed;        ///< [m/s]
   double dead_reckoning_age;    ///< oldest centerline a stop is steered along [s]
+  int wall_scans;               ///< one after the other must show too little room to stop; it brakes at once
   int obstacle_scans;           ///< one after the other must show an obstacle to slow down or stop
   double tracking_tolerance;    ///< articulation from its expected answer [rad]
   double tracking_time;         ///< [s]
@@ -216,7 +217,8 @@ class Arbiter {
 
   std::optional<Stamp> corridor_stamp_;  ///< of the scan last compared
   std::vector<FreeWay> free_ways_;  ///< of the last obstacle_scans scans, less what was driven since
-  int obstructed_scans_ = 0;        ///< one after the other
+  int obstructed_scans_ = 0;        ///< one after the other, by obstacle or wall
+  int obstacle_scans_ = 0;          ///< ... by an obstacle
   Reason obstruction_ = Reason::kObstacle;
 
   Decision decision_;

@@ -106,6 +106,7 @@ class Envelope {
   void findObstacles(const std::vector<geometry::Point>& points);
   void limitSight(const Input& input);
   bool inCorridor(const Beside& place) const;
+  bool onWall(const Beside& place) const;
   void drawCorridor();
   template <typename Take>
   void between(const Beside& a, const Beside& b, const Take& take);
