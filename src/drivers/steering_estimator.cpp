@@ -39,15 +39,7 @@ SteeringEstimatorParameters loadSteeringEstimator(config::Node& node) {
   p.bias_time = bias.number("time", "s", 0.1, 100.0);
   p.max_bias = bias.number("max", "rad", 0.0, 0.1);
   bias.finish();
-  config::Node yaw = node.child("yaw_response");
-  p.yaw.gain = yaw.number("gain", "1", 0.5, 1.5);
-  p.yaw.gain_deviation = yaw.number("gain_deviation", "1", 0.0, 0.5);
-  p.yaw.disturbance_deviation = yaw.number("disturbance_deviation", "1/m", 0.0, 0.05);
-  p.yaw.memory = yaw.number("memory", "s", 1.0, 1000.0);
-  p.yaw.noise = yaw.number("noise", "rad/s", 1e-3, 1.0);
-  p.yaw.rate_noise = yaw.number("rate_noise", "1", 0.0, 2.0);
-  p.yaw.least_speed = yaw.number("least_speed", "m/s", 0.1, 5.0);
-  yaw.finish();
+  p.yaw = loadYawObserver(node.child("yaw_response"));
   return p;
 }
 

@@ -5,6 +5,19 @@
 
 namespace tunnel_pilot::drivers {
 
+YawObserverParameters loadYawObserver(config::Node node) {
+  YawObserverParameters p{};
+  p.gain = node.number("gain", "1", 0.5, 1.5);
+  p.gain_deviation = node.number("gain_deviation", "1", 0.0, 0.5);
+  p.disturbance_deviation = node.number("disturbance_deviation", "1/m", 0.0, 0.05);
+  p.memory = node.number("memory", "s", 1.0, 1000.0);
+  p.noise = node.number("noise", "rad/s", 1e-3, 1.0);
+  p.rate_noise = node.number("rate_noise", "1", 0.0, 2.0);
+  p.least_speed = node.number("least_speed", "m/s", 0.1, 5.0);
+  node.finish();
+  return p;
+}
+
 YawObserver::YawObserver(const YawObserverParameters& parameters, const vehicle::TruckGeometry& geometry)
     : parameters_(parameters), geometry_(geometry) {
   reset();

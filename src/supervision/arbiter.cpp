@@ -8,6 +8,7 @@ namespace {
 
 constexpr double kProfileSpacing = 0.5;  // [m]
 constexpr double kStanding = 0.05;       // [m/s]
+constexpr double kGravity = 9.81;        // [m/s^2]
 
 double age(const std::optional<Stamp>& since, Stamp now) {
   return since ? toSeconds(now - *since) : std::numeric_limits<double>::infinity();
@@ -49,6 +50,8 @@ Arbiter::Arbiter(const ArbiterParameters& parameters, const vehicle::TruckParame
       governor_(parameters.governor),
       envelope_(parameters.envelope, parameters.limiter, truck.geometry),
       limiter_(parameters.limiter, truck.geometry),
+      yaw_(parameters.yaw, truck.geometry),
+      slip_compliance_(1.0 / (kGravity * truck.tyre.cornering_coefficient)),
       steering_monitor_(truck.steering, parameters.tracking_tolerance, parameters.tracking_time) {}
 
 // ---- inputs
@@ -79,6 +82,7 @@ void Arbiter::setTunnel(const perception::Tunnel& tunnel, Stamp now) {
 void Arbiter::setMotion(const drivers::Motion& motion, Stamp now) {
   motion_finite_ = drivers::isFinite(motion);
   if (!motion_finite_) return;
+  if (!history_.empty()) yaw_.update(motion, toSeconds(motion.stamp - history_.latest().stamp));
   history_.add(motion);
   motion_received_ = now;
 }
@@ -111,6 +115,7 @@ void Arbiter::clockJumped() {
   slots_ = {};
   history_.clear();
   envelope_.reset();
+  yaw_.reset();
   scan_received_.reset();
   gap_ended_.reset();
   tunnel_received_.reset();
@@ -387,7 +392,7 @@ void Arbiter::updateCorridor(double commanded, Stamp now) {
       centerline_pose_ ? scan_pose->relative(*centerline_pose_) : geometry::Pose{};
   envelope_.update({walls_, points_, centerline_, centerline_pose_ ? profile_ : no_profile_, path_frame,
                     scan_pose->relative(*here), *scan_pose, motion.articulation, commanded,
-                    std::abs(motion.speed)});
+                    std::abs(motion.speed), yaw_.response(), slip_compliance_});
   corridor_stamp_ = points_stamp_;
   const Envelope::Result& result = envelope_.result();
   free_ways_.push_back({result.free_distance, result.free_until});

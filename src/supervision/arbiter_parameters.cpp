@@ -80,6 +80,7 @@ ArbiterParameters loadArbiter(config::Node node) {
   p.obstacle_scans = static_cast<int>(node.integer("obstacle_scans", "1", 1, 10));
   p.wall_scans = static_cast<int>(node.integer("wall_scans", "1", p.obstacle_scans, 35));
   p.governor = loadSpeedGovernor(node.child("governor"));
+  p.yaw = drivers::loadYawObserver(node.child("yaw_response"));
   p.envelope = loadEnvelope(node.child("envelope"));
   p.limiter = loadCommandLimiter(node.child("limiter"));
   node.finish();

@@ -102,6 +102,12 @@ void Envelope::layTruck(const Input& input) {
   front_axle_ = stations_.size();
 }
 
+// Of the front axle, on a way of this curvature [1/m].
+double Envelope::slipAngle(const Input& input, double articulation, double curvature) const {
+  return -input.slip_compliance * input.speed * input.speed * curvature +
+         (input.response.gain - 1.0) * std::tan(0.5 * articulation);
+}
+
 // The spine ahead: the front axle's expected way, and the bodies swept along it.
 void Envelope::layWay(const Input& input) {
   const double way = std::min(parameters_.horizon, kLeastWay + 2.0 * stoppingDistance(input.speed));
@@ -117,6 +123,8 @@ void Envelope::layWay(const Input& input) {
   double heading_error = geometry::wrapAngle(on_centerline.heading - place.heading);
   Frame front(input.truck);
   double articulation = input.articulation;
+  double slip = slipAngle(input, articulation,
+                          vehicle::yawRate(geometry_, input.response.gain, articulation, 0.0));
   std::vector<Posture>& postures = postures_;
   postures.clear();
   for (double s = 0.0;; s += kStep) {
@@ -126,15 +134,20 @@ void Envelope::layWay(const Input& input) {
     const double target =
         on_path && s >= held
             ? drivers::followPath(input.profile, parameters_.follower, place.s, place.lateral_offset,
-                                  heading_error, limits_.max_articulation)
+                                  heading_error + slip, limits_.max_articulation) /
+                  input.response.gain
             : input.commanded_articulation;
     const double change = std::clamp(target - articulation, -slope * kStep, slope * kStep);
-    const double turn = vehicle::yawRate(geometry_, kStep, articulation + 0.5 * change, change);
+    const double middle = articulation + 0.5 * change;
+    const double turn = vehicle::yawRate(geometry_, input.response.gain * kStep, middle, change) +
+                        kStep * input.response.disturbance;
+    slip = slipAngle(input, middle, turn / kStep);
     articulation += change;
-    front = Frame(front.compose({kStep * std::cos(0.5 * turn), kStep * std::sin(0.5 * turn), turn}));
+    const double course = 0.5 * turn + slip;
+    front = Frame(front.compose({kStep * std::cos(course), kStep * std::sin(course), turn}));
     if (!on_path) continue;
     const double curvature = input.profile.curvatureAt(place.s);
-    place.lateral_offset += kStep * std::sin(heading_error + 0.5 * (turn - curvature * kStep));
+    place.lateral_offset += kStep * std::sin(heading_error + slip + 0.5 * (turn - curvature * kStep));
     place.s += kStep;
     heading_error += turn - curvature * kStep;
   }

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 
+#include "tunnel_pilot/config/node.h"
 #include "tunnel_pilot/drivers/driver.h"
 #include "tunnel_pilot/drivers/path_model.h"
 #include "tunnel_pilot/vehicle/truck_parameters.h"
@@ -17,6 +18,9 @@ struct YawObserverParameters {
   double rate_noise;             ///< more of it per yaw rate that the articulation's rate gives [1]
   double least_speed;            ///< nothing is learned at a lower one [m/s]
 };
+
+/// Reads and checks a map `yaw_response`. Throws config::ConfigError.
+YawObserverParameters loadYawObserver(config::Node node);
 
 /// Learns gain g and disturbance d of
 ///   yaw rate = (g v sin(gamma) + l_r gamma_dot) / (l_f cos(gamma) + l_r) + v d

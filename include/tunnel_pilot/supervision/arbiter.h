@@ -9,6 +9,7 @@
 #include "tunnel_pilot/drivers/articulation_profile.h"
 #include "tunnel_pilot/drivers/driver.h"
 #include "tunnel_pilot/drivers/motion_history.h"
+#include "tunnel_pilot/drivers/yaw_observer.h"
 #include "tunnel_pilot/perception/types.h"
 #include "tunnel_pilot/supervision/command.h"
 #include "tunnel_pilot/supervision/command_limiter.h"
@@ -53,6 +54,7 @@ struct ArbiterParameters {
   double disagreement_time;     ///< that it lasts [s]
   double clock_jump;            ///< a pause of the clock beyond this is a jump [s]
   SpeedGovernorParameters governor;
+  drivers::YawObserverParameters yaw;
   EnvelopeParameters envelope;
   CommandLimiterParameters limiter;
 };
@@ -193,6 +195,8 @@ class Arbiter {
   SpeedGovernor governor_;
   Envelope envelope_;
   CommandLimiter limiter_;
+  drivers::YawObserver yaw_;
+  double slip_compliance_;  ///< of the front tyres [rad s^2/m]
   SteeringMonitor steering_monitor_;
   drivers::MotionHistory history_;
 

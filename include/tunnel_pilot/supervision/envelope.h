@@ -8,6 +8,7 @@
 #include "tunnel_pilot/config/node.h"
 #include "tunnel_pilot/drivers/articulation_profile.h"
 #include "tunnel_pilot/drivers/path_follower.h"
+#include "tunnel_pilot/drivers/path_model.h"
 #include "tunnel_pilot/perception/types.h"
 #include "tunnel_pilot/supervision/command_limiter.h"
 #include "tunnel_pilot/vehicle/truck_parameters.h"
@@ -31,7 +32,8 @@ EnvelopeParameters loadEnvelope(config::Node node);
 /// The corridor that both bodies will sweep, against the walls and returns of one scan.
 /// The truck is driven ahead on paper: for the reaction time with the articulation commanded now, then
 /// back to the measured centerline (PathFollower), within the steering's rate; without a centerline the
-/// commanded articulation is held. Outline points of both bodies (nose, axles, hinge, tail, both sides)
+/// commanded articulation is held. It turns as its yaw rate was measured to answer, and crabs by the front
+/// axle's slip angle (beta of PreviewPlanner). Outline points of both bodies (nose, axles, hinge, tail, both sides)
 /// draw lines beside the front axle's way, the spine, which goes on backwards through the truck to its
 /// tail: each metre of it has a left and a right edge. Walls, remembered walls and returns are laid
 /// beside the same spine and compared.
@@ -50,6 +52,8 @@ class Envelope {
     double articulation;                          ///< [rad]
     double commanded_articulation;                ///< [rad]
     double speed;                                 ///< [m/s]
+    drivers::YawResponse response{};              ///< of the truck, as measured
+    double slip_compliance = 0.0;  ///< tyre slip angle per lateral acceleration [rad s^2/m]
   };
   enum class End { kSight, kWall, kObstacle };
   struct Result {
@@ -99,6 +103,7 @@ class Envelope {
 
   void layTruck(const Input& input);
   void layWay(const Input& input);
+  double slipAngle(const Input& input, double articulation, double curvature) const;
   void sweepBodies(std::size_t station, const Posture& posture, bool first);
   void layWall(const Input& input, bool left);
   void remember(const Input& input);
