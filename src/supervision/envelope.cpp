@@ -102,9 +102,16 @@ void Envelope::layTruck(const Input& input) {
   front_axle_ = stations_.size();
 }
 
+// A stop's, `braking` [m] after it began; before an obstacle or a bend the truck is no faster.
+double Envelope::brakedSpeed(double speed, double braking) const {
+  const double square = speed * speed - 2.0 * parameters_.deceleration * std::max(0.0, braking);
+  return std::max(kSlowest, std::sqrt(std::max(0.0, square)));
+}
+
 // Of the front axle, on a way of this curvature [1/m].
-double Envelope::slipAngle(const Input& input, double articulation, double curvature) const {
-  return -input.slip_compliance * input.speed * input.speed * curvature +
+double Envelope::slipAngle(const Input& input, double speed, double articulation,
+                           double curvature) const {
+  return -input.slip_compliance * speed * speed * curvature +
          (input.response.gain - 1.0) * std::tan(0.5 * articulation);
 }
 
@@ -112,7 +119,6 @@ double Envelope::slipAngle(const Input& input, double articulation, double curva
 void Envelope::layWay(const Input& input) {
   const double way = std::min(parameters_.horizon, kLeastWay + 2.0 * stoppingDistance(input.speed));
   const double held = input.speed * parameters_.reaction_time;
-  const double slope = limits_.max_articulation_rate / std::max(input.speed, kSlowest);
   const bool on_path = !input.profile.empty();
   geometry::PathProjection place;
   const Pose on_centerline = input.path_frame.relative(input.truck);
@@ -123,7 +129,7 @@ void Envelope::layWay(const Input& input) {
   double heading_error = geometry::wrapAngle(on_centerline.heading - place.heading);
   Frame front(input.truck);
   double articulation = input.articulation;
-  double slip = slipAngle(input, articulation,
+  double slip = slipAngle(input, input.speed, articulation,
                           vehicle::yawRate(geometry_, input.response.gain, articulation, 0.0));
   std::vector<Posture>& postures = postures_;
   postures.clear();
@@ -137,11 +143,13 @@ void Envelope::layWay(const Input& input) {
                                   heading_error + slip, limits_.max_articulation) /
                   input.response.gain
             : input.commanded_articulation;
+    const double speed = brakedSpeed(input.speed, s - held);
+    const double slope = limits_.max_articulation_rate / speed;
     const double change = std::clamp(target - articulation, -slope * kStep, slope * kStep);
     const double middle = articulation + 0.5 * change;
     const double turn = vehicle::yawRate(geometry_, input.response.gain * kStep, middle, change) +
                         kStep * input.response.disturbance;
-    slip = slipAngle(input, middle, turn / kStep);
+    slip = slipAngle(input, speed, middle, turn / kStep);
     articulation += change;
     const double course = 0.5 * turn + slip;
     front = Frame(front.compose({kStep * std::cos(course), kStep * std::sin(course), turn}));

@@ -31,12 +31,12 @@ EnvelopeParameters loadEnvelope(config::Node node);
 
 /// The corridor that both bodies will sweep, against the walls and returns of one scan.
 /// The truck is driven ahead on paper: for the reaction time with the articulation commanded now, then
-/// back to the measured centerline (PathFollower), within the steering's rate; without a centerline the
-/// commanded articulation is held. It turns as its yaw rate was measured to answer, and crabs by the front
-/// axle's slip angle (beta of PreviewPlanner). Outline points of both bodies (nose, axles, hinge, tail, both sides)
-/// draw lines beside the front axle's way, the spine, which goes on backwards through the truck to its
-/// tail: each metre of it has a left and a right edge. Walls, remembered walls and returns are laid
-/// beside the same spine and compared.
+/// back to the measured centerline (PathFollower), within the steering's rate at the speed of a stop;
+/// without a centerline the commanded articulation is held. It turns as its yaw rate was measured to
+/// answer, and crabs by the front axle's slip angle (beta of PreviewPlanner). Outline points of both
+/// bodies (nose, axles, hinge, tail, both sides) draw lines beside the front axle's way, the spine, which
+/// goes on backwards through the truck to its tail: each metre of it has a left and a right edge. Walls,
+/// remembered walls and returns are laid beside the same spine and compared.
 /// Free space is only what was seen: it ends with the centerline, or else with the walls.
 /// Everything is in base_link of the scan. Allocation-free once its buffers have grown.
 class Envelope {
@@ -103,7 +103,8 @@ class Envelope {
 
   void layTruck(const Input& input);
   void layWay(const Input& input);
-  double slipAngle(const Input& input, double articulation, double curvature) const;
+  double brakedSpeed(double speed, double braking) const;
+  double slipAngle(const Input& input, double speed, double articulation, double curvature) const;
   void sweepBodies(std::size_t station, const Posture& posture, bool first);
   void layWall(const Input& input, bool left);
   void remember(const Input& input);
