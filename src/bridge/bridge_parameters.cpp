@@ -39,6 +39,8 @@ BridgeParameters loadBridge(config::Node node) {
   p.steering_rate = node.number("steering_rate", "rad/s", 0.01, 0.5);
   p.gyro_bias_time = node.number("gyro_bias_time", "s", 0.1, 60.0);
   p.tracking = loadTracking(node.child("tracking"));
+  p.slip.compliance = node.number("slip_compliance", "rad s^2/m", 0.0, 0.1);
+  p.slip.yaw = drivers::loadYawObserver(node.child("yaw_response"));
   p.errors = loadSensorErrors(node.child("sensor_errors"));
   node.finish();
   return p;

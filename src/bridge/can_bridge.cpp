@@ -70,7 +70,8 @@ CanBridge::CanBridge(const BridgeParameters& parameters, const vehicle::TruckGeo
       bus_(bus),
       link_(parameters.feedback_timeout),
       sender_(parameters.frame_period),
-      odometry_(truck, parameters.gyro_bias_time, parameters.standstill_speed, parameters.errors),
+      odometry_(truck, parameters.gyro_bias_time, parameters.standstill_speed, parameters.errors,
+                parameters.slip),
       watch_(parameters.tracking) {}
 
 // -------- commands and operator

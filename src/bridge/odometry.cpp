@@ -8,12 +8,14 @@
 namespace tunnel_pilot::bridge {
 
 Odometry::Odometry(const vehicle::TruckGeometry& truck, double bias_time, double standstill_speed,
-                   const SensorErrors& errors)
+                   const SensorErrors& errors, const SlipModel& slip)
     : truck_(truck),
       bias_time_(bias_time),
       standstill_speed_(standstill_speed),
       errors_(errors),
-      error_(errors) {}
+      error_(errors),
+      slip_compliance_(slip.compliance),
+      yaw_(slip.yaw, truck) {}
 
 void Odometry::update(double articulation, double articulation_rate, double speed,
                       std::optional<double> gyro, Stamp now) {
@@ -28,19 +30,27 @@ void Odometry::update(double articulation, double articulation_rate, double spee
 
   const double turn = 0.5 * (motion_.yaw_rate + yaw_rate) * dt;
   const double way = 0.5 * (motion_.speed + speed) * dt;
-  const double middle = motion_.pose.heading + 0.5 * turn;
-  error_.advance(middle, way, dt, gyro.has_value(), kinematicYawDeviation(speed));
-  motion_.pose.x += way * std::cos(middle);
-  motion_.pose.y += way * std::sin(middle);
-  motion_.pose.heading = geometry::wrapAngle(motion_.pose.heading + turn);
-
+  const double slip_before = slip_;
   motion_.stamp = now;
   motion_.speed = speed;
   motion_.yaw_rate = yaw_rate;
   motion_.articulation = articulation;
   motion_.articulation_rate = articulation_rate;
+  if (gyro) yaw_.update(motion_, dt);
+  slip_ = slipAngle();
+  const double middle = motion_.pose.heading + 0.5 * (turn + slip_before + slip_);
+  error_.advance(middle, way, dt, gyro.has_value(), kinematicYawDeviation(speed));
+  motion_.pose.x += way * std::cos(middle);
+  motion_.pose.y += way * std::sin(middle);
+  motion_.pose.heading = geometry::wrapAngle(motion_.pose.heading + turn);
+
   has_gyro_ = gyro.has_value();
   started_ = true;
+}
+
+double Odometry::slipAngle() const {
+  return -slip_compliance_ * motion_.speed * motion_.yaw_rate +
+         (yaw_.response().gain - 1.0) * std::tan(0.5 * motion_.articulation);
 }
 
 // The hinge sensor's bias, as a yaw rate on a straight way.

@@ -84,8 +84,7 @@ PathPredictor::Errors PathPredictor::filterErrors(const perception::Tunnel& tunn
   if (last_scan_pose_ && measured.stamp >= last_scan_) {
     const double elapsed = toSeconds(measured.stamp - last_scan_);
     const Errors expected =
-        carried(last_errors_, last_scan_pose_->relative(scan_pose), measured.curvature, elapsed,
-                steering_.observed() ? steering_.motion().articulation : 0.0);
+        carried(last_errors_, last_scan_pose_->relative(scan_pose), measured.curvature);
     const double offset_change = measured.lateral_offset - expected.offset;
     const double heading_change = geometry::wrapAngle(measured.heading_error - expected.heading);
     if (std::abs(offset_change) < kOffsetJump && std::abs(heading_change) < kHeadingJump) {
@@ -100,23 +99,18 @@ PathPredictor::Errors PathPredictor::filterErrors(const perception::Tunnel& tunn
 }
 
 PathPredictor::Errors PathPredictor::carried(const Errors& from, const geometry::Pose& step,
-                                             double curvature, double elapsed,
-                                             double articulation) const {
+                                             double curvature) const {
   const double along = std::cos(from.heading) * step.x - std::sin(from.heading) * step.y;
   const double across = std::sin(from.heading) * step.x + std::cos(from.heading) * step.y;
-  const double speed = elapsed > 0.0 ? along / elapsed : 0.0;
-  const double sideways =
-      elapsed > 0.0 ? -parameters_.slip_compliance * speed * step.heading / elapsed : 0.0;
-  const double slip = sideways + (steering_.learned().gain - 1.0) * std::tan(0.5 * articulation);
   const double on_path = along / std::max(0.2, 1.0 - curvature * from.offset);
-  return {from.s + on_path, from.offset + across + along * slip - 0.5 * curvature * on_path * on_path,
+  return {from.s + on_path, from.offset + across - 0.5 * curvature * on_path * on_path,
           from.heading + step.heading - curvature * on_path};
 }
 
 PathState PathPredictor::overDeadTime(const perception::Tunnel& tunnel, const geometry::Pose& scan_pose,
                                       const Errors& errors, const Motion& motion, Stamp now) const {
-  const Errors driven = carried(errors, scan_pose.relative(motion.pose), tunnel.state.curvature,
-                                toSeconds(motion.stamp - tunnel.state.stamp), motion.articulation);
+  const Errors driven =
+      carried(errors, scan_pose.relative(motion.pose), tunnel.state.curvature);
   PathState state{driven.s, driven.offset, driven.heading, motion.articulation, 0.0};
   PathCursor cursor(tunnel.centerline, state.s);
   double heading = cursor.headingAt(state.s);

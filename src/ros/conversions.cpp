@@ -271,6 +271,7 @@ nav_msgs::Odometry toRos(const bridge::Odometry& odometry) {
   message.child_frame_id = kBaseFrame;
   message.pose.pose = toRos(motion.pose);
   message.twist.twist.linear.x = motion.speed;
+  message.twist.twist.linear.y = motion.speed * std::tan(odometry.slip());
   message.twist.twist.angular.z = motion.yaw_rate;
   constexpr std::size_t kMeasured[] = {0, 1, 5};  // x, y, yaw of the six rows
   constexpr std::size_t kRows = 6;

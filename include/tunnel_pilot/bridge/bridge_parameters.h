@@ -1,5 +1,6 @@
 #pragma once
 
+#include "tunnel_pilot/bridge/odometry.h"
 #include "tunnel_pilot/bridge/odometry_error.h"
 #include "tunnel_pilot/config/node.h"
 
@@ -37,6 +38,7 @@ struct BridgeParameters {
   double steering_rate;        ///< of the angle sent, the last limit before the bus [rad/s]
   double gyro_bias_time;       ///< time constant of the gyro's bias at standstill [s]
   TrackingParameters tracking;
+  SlipModel slip;       ///< for odometry
   SensorErrors errors;  ///< of what odometry is made from
 };
 

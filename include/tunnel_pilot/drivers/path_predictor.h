@@ -55,8 +55,7 @@ class PathPredictor {
   bool usable(const perception::Tunnel& tunnel, const Motion& motion, Stamp now) const;
   Errors filterErrors(const perception::Tunnel& tunnel, const geometry::Pose& scan_pose);
   /// Errors after a movement `step` (in the truck's frame) beside a path of this curvature.
-  Errors carried(const Errors& from, const geometry::Pose& step, double curvature, double elapsed,
-                 double articulation) const;
+  Errors carried(const Errors& from, const geometry::Pose& step, double curvature) const;
   PathState overDeadTime(const perception::Tunnel& tunnel, const geometry::Pose& scan_pose,
                          const Errors& errors, const Motion& motion, Stamp now) const;
 
