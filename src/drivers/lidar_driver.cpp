@@ -87,7 +87,7 @@ bool LidarInputs::fill(const std::vector<float>& ranges, const TruckInputs& truc
 
 void LidarInputs::fillMirrored(float* inputs) const {
   const TruckInputs mirrored{-truck_.articulation, -truck_.articulation_ahead, truck_.speed,
-                             truck_.yaw_gain, -truck_.yaw_disturbance, truck_.steering_rate};
+                             truck_.yaw_gain,      -truck_.yaw_disturbance,    truck_.steering_rate};
   write(inverse_.rbegin(), inverse_.rend(), mirrored, inputs);
 }
 
@@ -149,8 +149,12 @@ LidarDriver::Refusal LidarDriver::steer(const geometry::Scan& scan, const Motion
   if (!isFinite(motion)) return Refusal::kMotion;
   steering_.observe(motion);
   const double meets = steering_.articulationAhead(now);
-  truck_ = {steering_.motion().articulation, meets, motion.speed, steering_.learned().gain,
-            steering_.learned().disturbance, steering_.maxRate()};
+  truck_ = {steering_.motion().articulation,
+            meets,
+            motion.speed,
+            steering_.learned().gain,
+            steering_.learned().disturbance,
+            steering_.maxRate()};
   if (!inputs_.fill(scan.ranges, truck_, values_.data())) return Refusal::kScan;
   const Refusal refused = ask(now);
   if (refused != Refusal::kNone) return refused;

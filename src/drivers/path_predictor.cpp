@@ -109,8 +109,7 @@ PathPredictor::Errors PathPredictor::carried(const Errors& from, const geometry:
 
 PathState PathPredictor::overDeadTime(const perception::Tunnel& tunnel, const geometry::Pose& scan_pose,
                                       const Errors& errors, const Motion& motion, Stamp now) const {
-  const Errors driven =
-      carried(errors, scan_pose.relative(motion.pose), tunnel.state.curvature);
+  const Errors driven = carried(errors, scan_pose.relative(motion.pose), tunnel.state.curvature);
   PathState state{driven.s, driven.offset, driven.heading, motion.articulation, 0.0};
   PathCursor cursor(tunnel.centerline, state.s);
   double heading = cursor.headingAt(state.s);

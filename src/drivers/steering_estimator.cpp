@@ -12,6 +12,7 @@ constexpr double kLongestPause = 0.1;     // [s] a command moves no further than
 constexpr double kPredictionStep = 0.03;  // [s]
 constexpr double kSteady = 0.01;          // [rad] nearer to its command, the articulation stands
 constexpr double kOutOfReach = 0.85;      // [1] of max_rate * lag: the articulation turns at its fastest
+constexpr double kBoosted = 0.85;         // [1] of the lead that may be used; beyond it is boosted
 constexpr double kSettling = 0.25;        // [s] that it then takes to be at that rate
 // How fast a reversing command crosses the valve's dead band, in its own movements.
 constexpr double kDeadBandGain = 2.0;
@@ -28,6 +29,7 @@ SteeringEstimatorParameters loadSteeringEstimator(config::Node& node) {
   p.lag = steering.number("lag", "s", 0.02, 2.0);
   p.dead_band = steering.number("dead_band", "rad", 0.0, 0.05);
   p.lead = steering.number("lead", "rad", 0.01, 1.0);
+  p.boost = steering.number("boost", "rad", 0.0, 1.0);
   p.max_rate = steering.number("max_rate", "rad/s", 0.01, 2.0);
   p.max_articulation = steering.number("max_articulation", "rad", 0.1, 1.2);
   steering.finish();
@@ -77,8 +79,8 @@ void SteeringEstimator::observe(const Motion& motion) {
   yaw_.update(*last_motion_, passed);
 }
 
-// Only towards a command that stays out of reach does the articulation show how fast it can turn. A truck
-// that could turn faster than believed is not asked to.
+// Only towards a command that stays out of reach does the articulation show how fast it can turn. A
+// truck that could turn faster than believed is not asked to.
 void SteeringEstimator::learnMaxRate(double lead, double passed) {
   const double rate = std::copysign(1.0, lead) * last_motion_->articulation_rate;
   const bool far = std::abs(lead) > kOutOfReach * max_rate_ * parameters_.lag && rate > 0.0;
@@ -135,7 +137,12 @@ double SteeringEstimator::give(double command, double meets, Stamp now) {
   newest_ = (newest_ + 1) % given_.size();
   given_[newest_] = {now, command};
   last_time_ = now;
-  return std::clamp(command + play_, -parameters_.max_articulation, parameters_.max_articulation);
+  // The slowest steering has more lag than is believed, and keeps to its fastest rate only with more lead.
+  // It is not planned with: the first step back takes it away.
+  const double used = std::abs(command - meets) / parameters_.lead;
+  const double share = std::clamp((used - kBoosted) / (1.0 - kBoosted), 0.0, 1.0);
+  const double boost = std::copysign(share * parameters_.boost, command - meets);
+  return std::clamp(command + play_ + boost, -parameters_.max_articulation, parameters_.max_articulation);
 }
 
 }  // namespace tunnel_pilot::drivers

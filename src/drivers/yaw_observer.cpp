@@ -10,6 +10,7 @@ YawObserverParameters loadYawObserver(config::Node node) {
   p.gain = node.number("gain", "1", 0.5, 1.5);
   p.gain_deviation = node.number("gain_deviation", "1", 0.0, 0.5);
   p.disturbance_deviation = node.number("disturbance_deviation", "1/m", 0.0, 0.05);
+  p.hinge_share = node.number("hinge_share", "1", 0.5, 1.2);
   p.memory = node.number("memory", "s", 1.0, 1000.0);
   p.noise = node.number("noise", "rad/s", 1e-3, 1.0);
   p.rate_noise = node.number("rate_noise", "1", 0.0, 2.0);
@@ -42,7 +43,7 @@ void YawObserver::update(const Motion& motion, double elapsed) {
   const double arm =
       geometry_.front_axle_to_hinge * std::cos(motion.articulation) + geometry_.rear_axle_to_hinge;
   const double steady = motion.speed * std::sin(motion.articulation) / arm;
-  const double turning = geometry_.rear_axle_to_hinge * motion.articulation_rate / arm;
+  const double turning = parameters_.hinge_share * geometry_.rear_axle_to_hinge * motion.articulation_rate / arm;
   const Eigen::Vector2d seen(steady, motion.speed);
   const double noise = parameters_.noise + parameters_.rate_noise * std::abs(turning);
   const Eigen::Vector2d spread = covariance_ * seen;

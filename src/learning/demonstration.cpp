@@ -44,7 +44,8 @@ DemonstrationParameters demonstrationParameters(const drivers::SteeringEstimator
   constexpr double kLeastSpeed = 0.5;
   const double acts_after = steering.transport_delay + steering.dead_time;
   return {scan_delay,   acts_after,  scan_delay + acts_after + steering.lag,
-          steering.lag, kLeastSpeed, steering.max_rate, steering.yaw};
+          steering.lag, kLeastSpeed, steering.max_rate,
+          steering.yaw};
 }
 
 Demonstration::Demonstration(const DemonstrationParameters& parameters,

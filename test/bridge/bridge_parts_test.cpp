@@ -13,6 +13,7 @@
 #include "tunnel_pilot/bridge/truck_link.h"
 #include "tunnel_pilot/can/memory_bus.h"
 #include "tunnel_pilot/config/node.h"
+#include "tunnel_pilot/vehicle/dynamic_truck.h"
 #include "tunnel_pilot/vehicle/kinematic_truck.h"
 
 namespace tunnel_pilot::bridge {
@@ -55,7 +56,7 @@ TEST(BridgeParameters, EveryKeyIsNeededAndOfTheRightKind) {
     }
     ++keys;
   }
-  EXPECT_EQ(keys, 21);
+  EXPECT_EQ(keys, 23);
   YAML::Node unknown = YAML::Clone(good);
   unknown["typo"] = 1;
   EXPECT_TRUE(refused(unknown, "typo"));
@@ -65,10 +66,13 @@ TEST(BridgeParameters, EveryKeyIsNeededAndOfTheRightKind) {
 
 constexpr SensorErrors kErrors = {0.005, 0.01, 0.0, 0.05 * kDeg, 0.05 * kDeg, 0.00002, 0.3 * kDeg};
 
+// Of a truck whose front axle goes where it points to: the kinematic one.
+constexpr SlipModel kNoSlip = {0.0, {1.0, 0.0, 0.0, 1.0, 100.0, 0.03, 0.3, 0.8}};
+
 TEST(Odometry, FollowsTheTruckThroughAnS) {
   vehicle::KinematicTruck plant(truck());
   plant.reset(geometry::Pose(), 0.0, 3.0);
-  Odometry odometry(truck().geometry, 2.0, 0.05, kErrors);
+  Odometry odometry(truck().geometry, 2.0, 0.05, kErrors, kNoSlip);
   for (int i = 0; i <= 40000; ++i) {  // 40 s, 120 m
     const vehicle::PlantState& state = plant.state();
     if (i % 20 == 0) {
@@ -86,7 +90,7 @@ TEST(Odometry, HoldsItsWayWithTheSensorsErrors) {
   // driving.
   vehicle::KinematicTruck plant(truck());
   plant.reset(geometry::Pose(), 0.0, 0.0);
-  Odometry odometry(truck().geometry, 2.0, 0.05, kErrors);
+  Odometry odometry(truck().geometry, 2.0, 0.05, kErrors, kNoSlip);
   double way = 0.0;
   for (int i = 0; i <= 35000; ++i) {
     const vehicle::PlantState& state = plant.state();
@@ -104,20 +108,52 @@ TEST(Odometry, HoldsItsWayWithTheSensorsErrors) {
   EXPECT_NEAR(odometry.gyroBias(), 0.2 * kDeg, 0.03 * kDeg);
 }
 
+// How far to the side of its course the dynamic truck, loaded, is lost in a 90 deg bend of 15 m.
+double lostInABend(double yaw_gain, const SlipModel& slip) {
+  vehicle::TruckParameters parameters = truck();
+  parameters.tyre.yaw_gain = yaw_gain;
+  vehicle::DynamicTruck plant(parameters, {});
+  plant.reset(geometry::Pose(), 0.0, 3.0);
+  Odometry odometry(parameters.geometry, 2.0, 0.05, kErrors, slip);
+  for (int i = 0; i <= 12000; ++i) {
+    const vehicle::PlantState& state = plant.state();
+    if (i % 20 == 0) {
+      odometry.update(state.articulation, state.articulation_rate, state.speed, state.yaw_rate, ms(i));
+    }
+    plant.step({i < 1000 ? 0.0 : 0.35, 0.3 * (3.0 - state.speed) + 0.2}, {}, 1e-3);
+  }
+  const geometry::Pose error = plant.state().pose.relative(odometry.motion().pose);
+  return std::hypot(error.x, error.y);
+}
+
+TEST(Odometry, SeesTheTyresSlipInABend) {
+  const SlipModel slip =
+      loadBridge(config::loadFile(std::string(TUNNEL_PILOT_SOURCE_DIR) + "/config/can_bridge.yaml"))
+          .slip;
+  EXPECT_LT(lostInABend(1.0, slip), 0.5 * lostInABend(1.0, kNoSlip));
+}
+
+TEST(Odometry, SeesTheSlipOfATruckThatTurnsLessThanItsHinge) {
+  const SlipModel slip =
+      loadBridge(config::loadFile(std::string(TUNNEL_PILOT_SOURCE_DIR) + "/config/can_bridge.yaml"))
+          .slip;
+  EXPECT_LT(lostInABend(0.8, slip), 0.3 * lostInABend(0.8, kNoSlip));
+}
+
 TEST(Odometry, DoesNotLearnTheBiasWhileDriving) {
-  Odometry odometry(truck().geometry, 2.0, 0.05, kErrors);
+  Odometry odometry(truck().geometry, 2.0, 0.05, kErrors, kNoSlip);
   for (int i = 0; i < 500; ++i) odometry.update(0.1, 0.0, 3.0, 0.3, ms(20 * i));
   EXPECT_EQ(odometry.gyroBias(), 0.0);
 }
 
 TEST(Odometry, UsesKinematicsWithoutAGyro) {
-  Odometry odometry(truck().geometry, 2.0, 0.05, kErrors);
+  Odometry odometry(truck().geometry, 2.0, 0.05, kErrors, kNoSlip);
   odometry.update(12.0 * kDeg, 0.0, 3.0, std::nullopt, ms(0));
   EXPECT_NEAR(odometry.motion().yaw_rate, 7.05 * kDeg, 0.02 * kDeg);  // SPECIFICATION 1.0
 }
 
 TEST(Odometry, IntegratesNothingAcrossAClockThatJumped) {
-  Odometry odometry(truck().geometry, 2.0, 0.05, kErrors);
+  Odometry odometry(truck().geometry, 2.0, 0.05, kErrors, kNoSlip);
   odometry.update(0.0, 0.0, 3.0, 0.0, ms(100000));
   odometry.forgetTime();
   odometry.update(0.0, 0.0, 3.0, 0.0, ms(0));
@@ -136,7 +172,7 @@ TEST(Odometry, KnowsHowFarOffItMayBe) {
   for (int truck_number = 0; truck_number < kTrucks; ++truck_number) {
     const double scale = 1.0 + kErrors.speed_scale * normal(engine);
     double bias = kErrors.gyro_bias * normal(engine);
-    Odometry odometry(truck().geometry, 2.0, 0.05, kErrors);
+    Odometry odometry(truck().geometry, 2.0, 0.05, kErrors, kNoSlip);
     geometry::Pose pose;
     for (int i = 0; i <= 2000; ++i) {  // 5 s at rest, then 35 s: an S of 100 m
       const auto speed = [](int at) { return at < 250 ? 0.0 : 3.0; };
@@ -161,7 +197,8 @@ TEST(Odometry, KnowsHowFarOffItMayBe) {
 }
 
 TEST(Odometry, IsLessSureWithoutAGyro) {
-  Odometry with(truck().geometry, 2.0, 0.05, kErrors), without(truck().geometry, 2.0, 0.05, kErrors);
+  Odometry with(truck().geometry, 2.0, 0.05, kErrors, kNoSlip);
+  Odometry without(truck().geometry, 2.0, 0.05, kErrors, kNoSlip);
   for (int i = 0; i <= 1000; ++i) {
     with.update(0.0, 0.0, 3.0, 0.0, ms(20 * i));
     without.update(0.0, 0.0, 3.0, std::nullopt, ms(20 * i));

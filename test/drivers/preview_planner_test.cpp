@@ -70,6 +70,25 @@ TEST(PreviewPlanner, HoldsTheSteadyArticulationOnAnArc) {
   EXPECT_NEAR(planned(p, {5.0, 0.0, 0.0, steady, steady}, path, 3.0), 0.0, 0.003);
 }
 
+TEST(PreviewPlanner, ReckonsWithASlowerTruckInASharpBendAhead) {
+  // A reversal that no hinge follows at 6 m/s: a plan that held that speed would cut it.
+  const geometry::Path path = geometry::buildPath(
+      {{20.0, 0.0, 0.0}, {8.0, 0.0, -0.083}, {14.0, -0.083, 0.083}, {20.0, 0.083, 0.083}}, {}, 0.25);
+  PreviewPlanner p = planner(0.65);
+  planned(p, {2.0, 0.0, 0.0, 0.0, 0.0}, path, 6.0);
+  double farthest = 0.0;
+  for (double t = 0.0; t < 4.8; t += 0.15) {
+    farthest = std::max(farthest, std::abs(p.plannedAt(t).offset));
+  }
+  EXPECT_LT(farthest, 0.20);
+}
+
+TEST(PreviewPlanner, PlansWithTheRateThatItIsTold) {
+  PreviewPlanner p = planner();
+  p.setMaxRate(0.2);
+  EXPECT_LE(std::abs(planned(p, {5.0, 3.0, 0.4, 0.0, 0.0}, straight(), 4.0)), 0.2);
+}
+
 TEST(PreviewPlanner, NeverMakesThePlanWorse) {
   // The cost after each plan, for a standing situation far from the path, falls or stays.
   PreviewPlanner p = planner();

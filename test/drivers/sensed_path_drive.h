@@ -49,6 +49,7 @@ inline SensedPathDrive::Result SensedPathDrive::run(vehicle::Plant& plant, PathD
   Result result;
   plant.reset(start, 0.0, speed);
   motion.pose = start;
+  geometry::Pose last = start;
   double s = path.project(start.position()).s;
   const double side = path.project(start.position()).lateral_offset;
   const long steps = std::lround(duration / kStep);
@@ -59,8 +60,11 @@ inline SensedPathDrive::Result SensedPathDrive::run(vehicle::Plant& plant, PathD
     s = foot.s;
     if (i % 20 == 0) {
       const double yaw_rate = state.yaw_rate + 0.001 * normal(engine);
+      geometry::Pose driven = last.relative(state.pose);  // as odometry that sees the slip tells it
+      driven.heading = i > 0 ? 0.02 * yaw_rate : 0.0;
+      last = state.pose;
       motion = {now,
-                advanced(motion.pose, state.speed, yaw_rate, i > 0 ? 0.02 : 0.0),
+                motion.pose.compose(driven),
                 1.005 * state.speed,
                 yaw_rate,
                 state.articulation + articulation_bias + 0.0017 * normal(engine),

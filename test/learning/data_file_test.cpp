@@ -40,6 +40,7 @@ Example exampleOf(int i) {
   example.speed = 0.3F + x;
   example.yaw_gain = 0.4F + x;
   example.yaw_disturbance = 0.5F + x;
+  example.steering_rate = 0.55F + x;
   example.label = 0.6F + x;
   example.tunnel = 4'000'000'000U + static_cast<std::uint32_t>(i);
   return example;
@@ -103,6 +104,7 @@ TEST_F(DataFile, GivesBackWhatWasWritten) {
     EXPECT_EQ(example.articulation_ahead, expected.articulation_ahead);
     EXPECT_EQ(example.speed, expected.speed);
     EXPECT_EQ(example.yaw_gain, expected.yaw_gain);
+    EXPECT_EQ(example.steering_rate, expected.steering_rate);
     EXPECT_EQ(example.yaw_disturbance, expected.yaw_disturbance);
     EXPECT_EQ(example.label, expected.label);
     EXPECT_EQ(example.tunnel, expected.tunnel);

@@ -40,6 +40,9 @@ struct ArbiterBench {
     if (give_scan) {
       scene = sceneAt(line, {20.0, 0.0, 0.0}, 5.0, now - latency, 25.0);
       if (obstacle) addObstacle(scene, *obstacle, 0.0, 0.8);
+      if (narrow) {
+        for (auto& p : scene.walls.left.curve) p.y() -= p.x() > *narrow ? 0.9 : 0.0;
+      }
       scene.tunnel.state.valid = tunnel_valid;
       if (!tunnel_valid) scene.tunnel.centerline = geometry::Path();
       arbiter->setPoints(scene.points, scene.walls.stamp, now);
@@ -80,6 +83,7 @@ struct ArbiterBench {
   double wanted = 0.0;
   double speed = 3.0;
   std::optional<double> obstacle;
+  std::optional<double> narrow;  // the left wall stands nearer from here on
 };
 
 }  // namespace tunnel_pilot::supervision

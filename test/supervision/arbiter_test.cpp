@@ -539,6 +539,28 @@ TEST(Arbiter, OneScanOfAnObstacleIsNotBelieved) {
   EXPECT_FALSE(bench.cycles(20).command.stop);
 }
 
+TEST(Arbiter, TooLittleRoomWithinTheStoppingDistanceBrakesAtOnceAndStopsWhenItStays) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.narrow = 5.0;
+  bench.cycles(2);
+  const Decision first = bench.cycle();
+  EXPECT_FALSE(first.command.stop);
+  EXPECT_LT(first.command.speed, 3.0);
+  const Decision& last = bench.cycles(bench.parameters.wall_scans);
+  EXPECT_TRUE(last.command.stop);
+  EXPECT_EQ(last.command.reason, Reason::kClearance);
+}
+
+TEST(Arbiter, TooLittleRoomInAFewScansDoesNotStop) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.narrow = 5.0;
+  bench.cycles(bench.parameters.wall_scans - 1);
+  bench.narrow.reset();
+  EXPECT_FALSE(bench.cycles(20).command.stop);
+}
+
 TEST(Arbiter, AnObstacleFarAheadOnlySlowsDown) {
   ArbiterBench bench;
   bench.drive();

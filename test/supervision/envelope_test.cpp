@@ -18,6 +18,8 @@ struct Check {
   double speed = 3.0;
   double articulation = 0.0;
   double commanded = 0.0;
+  drivers::YawResponse response;
+  double slip_compliance = 0.0;
   geometry::Pose odom;
 
   const Envelope::Result& of(const Scene& scene) {
@@ -34,7 +36,9 @@ struct Check {
                             odom,
                             articulation,
                             commanded,
-                            speed});
+                            speed,
+                            response,
+                            slip_compliance});
   }
 };
 
@@ -130,6 +134,48 @@ TEST(Envelope, AnObstacleWithinTheMarginCounts) {
   scene.points.push_back({7.1, kHalfTruck + 0.1});
   scene.points.push_back({7.2, kHalfTruck + 0.1});
   EXPECT_EQ(check.of(scene).free_until, Envelope::End::kObstacle);
+}
+
+TEST(Envelope, ARoughWallWithinTheMarginIsNoObstacle) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  const double margin = check.parameters.envelope.margin;
+  for (auto& p : scene.walls.left.curve) p.y() = kHalfTruck + margin + 0.03;
+  for (const double x : {7.0, 7.15, 7.3}) scene.points.push_back({x, kHalfTruck + margin - 0.03});
+  EXPECT_EQ(check.of(scene).free_until, Envelope::End::kWall);
+}
+
+// Where the way ends that a truck takes with a held articulation, left of where it points to [m].
+double endOfHeldWay(Check& check) {
+  Scene scene;
+  check.articulation = check.commanded = 0.1;
+  const Envelope::Result& result = check.of(scene);
+  return 0.5 * (result.corridor_left.back().y() + result.corridor_right.back().y());
+}
+
+TEST(Envelope, ATruckThatTurnsLessThanItsHingeIsExpectedToGoWider) {
+  Check check;
+  const double usual = endOfHeldWay(check);
+  check.response.gain = 0.8;
+  EXPECT_LT(endOfHeldWay(check), usual - 0.3);
+}
+
+TEST(Envelope, ATruckThatSlipsIsExpectedToGoWider) {
+  Check check;
+  const double usual = endOfHeldWay(check);
+  check.slip_compliance = 0.2;
+  EXPECT_LT(endOfHeldWay(check), usual - 0.1);
+}
+
+TEST(Envelope, TheExpectedWayTakesABendAtTheSpeedOfAStop) {
+  // At 7 m/s the hinge could not follow the bend ahead; nobody will come to it at that speed.
+  const geometry::Path line =
+      geometry::buildPath({{45.0, 0.0, 0.0}, {10.0, 0.0, 0.0667}, {30.0, 0.0667, 0.0667}}, {}, 0.25);
+  Check check;
+  check.speed = 7.0;
+  const Envelope::Result& result = check.of(sceneAt(line, {20.0, 0.0, 0.0}, 5.0, Stamp(1), 38.0));
+  EXPECT_EQ(result.free_until, Envelope::End::kSight);
+  EXPECT_GT(result.clearance_right, 0.5);
 }
 
 TEST(Envelope, LoneDustDoesNotStopTheTruck) {

@@ -12,7 +12,7 @@ namespace tunnel_pilot::bridge {
 
 /// How the truck slips sideways.
 struct SlipModel {
-  double compliance;                  ///< tyre slip angle per lateral acceleration, 1/(g_0 C) [rad s^2/m]
+  double compliance;  ///< tyre slip angle per lateral acceleration, 1/(g_0 C) [rad s^2/m]
   drivers::YawObserverParameters yaw;  ///< how g is learned
 };
 
@@ -22,8 +22,8 @@ struct SlipModel {
 /// each step (midpoint rule). The course is the heading and the front axle's slip angle
 ///   beta = -v theta' / (g_0 C) + (g - 1) tan(gamma / 2):
 /// the tyres' quasi-static one, with C their cornering coefficient, and what a yaw gain g other than 1
-/// tells of the slip if both axles share it alike (drivers::YawObserver learns g). The kinematic yaw rate (v sin(gamma) + l_r gamma')/(l_f cos(gamma) + l_r)
-/// (the paper's equation 2) serves twice:
+/// tells of the slip if both axles share it alike (drivers::YawObserver learns g). The kinematic yaw
+/// rate (v sin(gamma) + l_r gamma')/(l_f cos(gamma) + l_r) (the paper's equation 2) serves twice:
 ///  - it teaches the gyro's bias, but only at standstill, where it is exact. While driving, the hinge
 ///    sensor's own bias of 0.3 deg would be worth 0.17 deg/s at 3 m/s, more than a gyro's drift;
 ///  - it stands in when there is no fresh gyro.

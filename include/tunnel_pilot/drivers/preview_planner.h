@@ -38,6 +38,7 @@ struct PreviewWeights {
 class PreviewPlanner {
  public:
   static constexpr std::size_t kStages = 32;
+  static constexpr double kSlowedDown = 8.0;  ///< stages until somebody has slowed the truck down
 
   PreviewPlanner(const TruckResponse& truck, const PreviewWeights& weights, double step);
 
@@ -72,10 +73,13 @@ class PreviewPlanner {
     const double v = std::max(speed, weights_.slope_speed);
     return weights_.slope / (v * v);
   }
+  /// Late in the horizon a share; beyond slope_speed, as much a metre of way as at that speed, squared:
+  /// a truck that comes faster will have slowed down before a bend that needs it.
   double rateLimit(std::size_t stage, double speed) const {
+    const auto k = static_cast<double>(stage);
     const double faster = std::max(1.0, speed / weights_.slope_speed);
-    const double late = weights_.rate_share * faster * faster;
-    return truck_.max_rate * std::max(late, 1.0 - 0.10 * static_cast<double>(stage));
+    const double slowed = std::min(1.0, k / kSlowedDown) * (faster * faster - 1.0);
+    return truck_.max_rate * std::max(weights_.rate_share, 1.0 - 0.10 * k) * (1.0 + slowed);
   }
   /// Heading error with which the course follows a path of this curvature despite the slip [rad].
   double courseOffset(double speed, double curvature, const YawResponse& believed) const;

@@ -18,6 +18,7 @@ struct SteeringEstimatorParameters {
   double lag;               ///< of the steering, first order [s]
   double dead_band;         ///< full width, lost on a reversal of the command [rad]
   double lead;              ///< of the command before the articulation it will meet, at most [rad]
+  double boost;             ///< added to the command sent where the lead is used up [rad]
   double max_rate;          ///< of the steering [rad/s]
   double max_articulation;  ///< highest command [rad]
   double rate_time;         ///< memory of the fastest rate [s]
@@ -27,7 +28,8 @@ struct SteeringEstimatorParameters {
   YawObserverParameters yaw;
 };
 
-/// Reads the maps `steering`, `fastest_rate`, `articulation_bias` and `yaw_response` of a driver's file. Throws config::ConfigError.
+/// Reads the maps `steering`, `fastest_rate`, `articulation_bias` and `yaw_response` of a driver's file.
+/// Throws config::ConfigError.
 SteeringEstimatorParameters loadSteeringEstimator(config::Node& node);
 
 /// Keeps the commands that a driver gives and knows what they come to:
@@ -57,14 +59,16 @@ class SteeringEstimator {
 
   /// Takes the command that a driver has found, held within `lead` of the articulation `meets` [rad]
   /// that it will meet, so that a driver takes over from where the truck stands while another one
-  /// steers. Returns what to send: the command and what crosses the valve's dead band [rad].
+  /// steers. Returns what to send: the command, what crosses the valve's dead band, and the boost [rad].
   double give(double command, double meets, Stamp now);
 
   /// Time since the last command, no more than a pause that it can bridge; 0 before the first one [s].
   double elapsed(Stamp now) const;
   Stamp delay() const;  ///< from a command given to the valve's answer
   YawResponse learned() const { return yaw_.response(); }
-  double maxRate() const { return max_rate_; }  ///< the fastest the articulation turns, as learned [rad/s]
+  double maxRate() const {
+    return max_rate_;
+  }  ///< the fastest the articulation turns, as learned [rad/s]
 
   void reset();
 

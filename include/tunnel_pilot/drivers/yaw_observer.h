@@ -13,6 +13,7 @@ struct YawObserverParameters {
   double gain;                   ///< g of a truck not yet known [1]
   double gain_deviation;         ///< standard deviation of g among trucks, loads, floors [1]
   double disturbance_deviation;  ///< of d [1/m]
+  double hinge_share;            ///< h [1]
   double memory;                 ///< after which a truck may have changed [s]
   double noise;                  ///< of the measured yaw rate against the model, a cycle [rad/s]
   double rate_noise;             ///< more of it per yaw rate that the articulation's rate gives [1]
@@ -23,10 +24,11 @@ struct YawObserverParameters {
 YawObserverParameters loadYawObserver(config::Node node);
 
 /// Learns gain g and disturbance d of
-///   yaw rate = (g v sin(gamma) + l_r gamma_dot) / (l_f cos(gamma) + l_r) + v d
+///   yaw rate = (g v sin(gamma) + h l_r gamma_dot) / (l_f cos(gamma) + l_r) + v d
 /// from gyro, articulation and speed, with a two-state Kalman filter whose state returns to the prior
 /// and whose uncertainty returns to the prior with the time `memory` (Ornstein-Uhlenbeck), so that it
-/// never winds up where nothing is excited.
+/// never winds up where nothing is excited. h is known: of what the turning hinge gives by kinematics, the
+/// tyres' slip takes a little away.
 class YawObserver {
  public:
   YawObserver(const YawObserverParameters& parameters, const vehicle::TruckGeometry& geometry);

@@ -22,8 +22,8 @@ struct Example {
 };
 
 inline drivers::TruckInputs truckInputsOf(const Example& example) {
-  return {static_cast<double>(example.articulation), static_cast<double>(example.articulation_ahead),
-          static_cast<double>(example.speed), static_cast<double>(example.yaw_gain),
+  return {static_cast<double>(example.articulation),    static_cast<double>(example.articulation_ahead),
+          static_cast<double>(example.speed),           static_cast<double>(example.yaw_gain),
           static_cast<double>(example.yaw_disturbance), static_cast<double>(example.steering_rate)};
 }
 

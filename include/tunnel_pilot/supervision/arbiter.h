@@ -45,14 +45,14 @@ struct ArbiterParameters {
   double recovery_time;         ///< of health before driving fast again [s]
   double degraded_speed;        ///< [m/s]
   double dead_reckoning_age;    ///< oldest centerline a stop is steered along [s]
-  int wall_scans;               ///< one after the other must show too little room to stop; it brakes at once
-  int obstacle_scans;           ///< one after the other must show an obstacle to slow down or stop
-  double tracking_tolerance;    ///< articulation from its expected answer [rad]
-  double tracking_time;         ///< [s]
-  int limit_hits;               ///< of angle or lateral acceleration within recovery_time: slowly
-  double disagreement_angle;    ///< between lidar and preview driver: slowly [rad]
-  double disagreement_time;     ///< that it lasts [s]
-  double clock_jump;            ///< a pause of the clock beyond this is a jump [s]
+  int wall_scans;      ///< one after the other must show too little room to stop; it brakes at once
+  int obstacle_scans;  ///< one after the other must show an obstacle to slow down or stop
+  double tracking_tolerance;  ///< articulation from its expected answer [rad]
+  double tracking_time;       ///< [s]
+  int limit_hits;             ///< of angle or lateral acceleration within recovery_time: slowly
+  double disagreement_angle;  ///< between lidar and preview driver: slowly [rad]
+  double disagreement_time;   ///< that it lasts [s]
+  double clock_jump;          ///< a pause of the clock beyond this is a jump [s]
   SpeedGovernorParameters governor;
   drivers::YawObserverParameters yaw;
   EnvelopeParameters envelope;

@@ -34,11 +34,11 @@ EnvelopeParameters loadEnvelope(config::Node node);
 /// back to the measured centerline (PathFollower), within the steering's rate at the speed of a stop;
 /// without a centerline the commanded articulation is held. It turns as its yaw rate was measured to
 /// answer, and crabs by the front axle's slip angle (beta of PreviewPlanner). Outline points of both
-/// bodies (nose, axles, hinge, tail, both sides) draw lines beside the front axle's way, the spine, which
-/// goes on backwards through the truck to its tail: each metre of it has a left and a right edge. Walls,
-/// remembered walls and returns are laid beside the same spine and compared.
-/// Free space is only what was seen: it ends with the centerline, or else with the walls.
-/// Everything is in base_link of the scan. Allocation-free once its buffers have grown.
+/// bodies (nose, axles, hinge, tail, both sides) draw lines beside the front axle's way, the spine,
+/// which goes on backwards through the truck to its tail: each metre of it has a left and a right edge.
+/// Walls, remembered walls and returns are laid beside the same spine and compared. Free space is only
+/// what was seen: it ends with the centerline, or else with the walls. Everything is in base_link of the
+/// scan. Allocation-free once its buffers have grown.
 class Envelope {
  public:
   struct Input {
