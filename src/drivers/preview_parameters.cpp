@@ -5,18 +5,6 @@
 namespace tunnel_pilot::drivers {
 namespace {
 
-PreviewWeights loadWeights(config::Node node) {
-  PreviewWeights weights{};
-  weights.offset = node.number("offset", "1/m^2", 1e-3, 1e3);
-  weights.heading = node.number("heading", "1/rad^2", 0.0, 1e4);
-  weights.slope = node.number("slope", "m^2/rad^2", 1e-2, 1e5);
-  weights.slope_speed = node.number("slope_speed", "m/s", 0.1, 10.0);
-  weights.terminal = node.number("terminal", "1", 1.0, 1e3);
-  weights.rate_share = node.number("rate_share", "1", 0.3, 1.0);
-  node.finish();
-  return weights;
-}
-
 AdaptationParameters loadAdaptation(config::Node node) {
   AdaptationParameters adaptation{};
   adaptation.enabled = node.boolean("enabled");
@@ -38,6 +26,19 @@ NetworkLawParameters loadNetworkLaw(config::Node node, const std::string& folder
 
 }  // namespace
 
+PreviewWeights loadPreviewWeights(config::Node node) {
+  PreviewWeights weights{};
+  weights.offset = node.number("offset", "1/m^2", 1e-3, 1e3);
+  weights.heading = node.number("heading", "1/rad^2", 0.0, 1e4);
+  weights.slope = node.number("slope", "m^2/rad^2", 1e-2, 1e5);
+  weights.slope_speed = node.number("slope_speed", "m/s", 0.1, 10.0);
+  weights.terminal = node.number("terminal", "1", 1.0, 1e3);
+  weights.rate_share = node.number("rate_share", "1", 0.3, 1.0);
+  weights.sharp_speed = node.number("sharp_speed", "m/s", 0.1, 100.0);
+  node.finish();
+  return weights;
+}
+
 PreviewLaw readPreviewLaw(config::Node& node, const std::string& key) {
   return node.choice(key, {"optimal", "network"}) == "network" ? PreviewLaw::kNetwork
                                                                : PreviewLaw::kOptimal;
@@ -52,7 +53,7 @@ PreviewDriverParameters loadPreviewDriver(config::Node node, const std::string& 
   p.planning_speed = node.number("planning_speed", "m/s", 0.1, 3.0);
   p.preview_time = node.number("preview_time", "s", 0.1, 5.0);
   p.step = node.number("step", "s", 0.02, 0.5);
-  p.weights = loadWeights(node.child("weights"));
+  p.weights = loadPreviewWeights(node.child("weights"));
   p.network_law = loadNetworkLaw(node.child("network"), folder);
   p.truck = loadPathPredictor(node);
   node.finish();

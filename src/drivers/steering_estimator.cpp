@@ -137,12 +137,13 @@ double SteeringEstimator::give(double command, double meets, Stamp now) {
   newest_ = (newest_ + 1) % given_.size();
   given_[newest_] = {now, command};
   last_time_ = now;
-  // The slowest steering has more lag than is believed, and keeps to its fastest rate only with more lead.
-  // It is not planned with: the first step back takes it away.
+  // The slowest steering has more lag than is believed, and keeps to its fastest rate only with more
+  // lead. It is not planned with: the first step back takes it away.
   const double used = std::abs(command - meets) / parameters_.lead;
   const double share = std::clamp((used - kBoosted) / (1.0 - kBoosted), 0.0, 1.0);
   const double boost = std::copysign(share * parameters_.boost, command - meets);
-  return std::clamp(command + play_ + boost, -parameters_.max_articulation, parameters_.max_articulation);
+  return std::clamp(command + play_ + boost, -parameters_.max_articulation,
+                    parameters_.max_articulation);
 }
 
 }  // namespace tunnel_pilot::drivers

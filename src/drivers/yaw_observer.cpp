@@ -43,7 +43,8 @@ void YawObserver::update(const Motion& motion, double elapsed) {
   const double arm =
       geometry_.front_axle_to_hinge * std::cos(motion.articulation) + geometry_.rear_axle_to_hinge;
   const double steady = motion.speed * std::sin(motion.articulation) / arm;
-  const double turning = parameters_.hinge_share * geometry_.rear_axle_to_hinge * motion.articulation_rate / arm;
+  const double turning =
+      parameters_.hinge_share * geometry_.rear_axle_to_hinge * motion.articulation_rate / arm;
   const Eigen::Vector2d seen(steady, motion.speed);
   const double noise = parameters_.noise + parameters_.rate_noise * std::abs(turning);
   const Eigen::Vector2d spread = covariance_ * seen;

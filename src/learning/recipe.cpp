@@ -3,6 +3,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include "tunnel_pilot/drivers/preview_parameters.h"
+
 namespace tunnel_pilot::learning {
 namespace {
 
@@ -40,18 +42,6 @@ NetworkDesign loadDesign(config::Node node) {
   design.gaussian = node.choice("output", {"gaussian", "value"}) == "gaussian";
   node.finish();
   return design;
-}
-
-drivers::PreviewWeights loadTeacher(config::Node node) {
-  drivers::PreviewWeights weights;
-  weights.offset = node.number("offset", "1/m^2", 1e-3, 1e3);
-  weights.heading = node.number("heading", "1/rad^2", 0.0, 1e4);
-  weights.slope = node.number("slope", "m^2/rad^2", 1e-2, 1e5);
-  weights.slope_speed = node.number("slope_speed", "m/s", 0.1, 10.0);
-  weights.terminal = node.number("terminal", "1", 1.0, 1e3);
-  weights.rate_share = node.number("rate_share", "1", 0.3, 1.0);
-  node.finish();
-  return weights;
 }
 
 SceneSource loadScenes(config::Node node, const std::filesystem::path& base) {
@@ -111,7 +101,7 @@ Recipe loadRecipe(const std::string& file) {
   recipe.base_scenario = beside(node, "scenario", base);
   recipe.seed = static_cast<std::uint64_t>(node.integer("seed", "1", 0, 1'000'000'000));
   recipe.design = loadDesign(node.child("network"));
-  recipe.teacher = loadTeacher(node.child("teacher"));
+  recipe.teacher = drivers::loadPreviewWeights(node.child("teacher"));
   for (config::Node& source : node.children("scenes")) {
     recipe.scenes.push_back(loadScenes(std::move(source), base));
   }

@@ -14,6 +14,7 @@ constexpr double kUnlimited = 100.0;   // the speed is fixed: the governor has n
 
 PilotParameters withFixedSpeed(PilotParameters parameters, double speed) {
   parameters.preview_driver.speed = speed;
+  parameters.preview_driver.weights.sharp_speed = kUnlimited;
   parameters.arbiter.wall_checks = false;
   parameters.arbiter.governor.max_lateral_acceleration = kUnlimited;
   parameters.arbiter.governor.max_articulation_rate = kUnlimited;

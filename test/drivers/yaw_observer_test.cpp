@@ -9,7 +9,7 @@
 namespace tunnel_pilot::drivers {
 namespace {
 
-constexpr YawObserverParameters kParameters{1.0, 0.15, 0.003, 100.0, 0.03, 1.0, 0.8};
+constexpr YawObserverParameters kParameters{1.0, 0.15, 0.003, 0.94, 100.0, 0.03, 0.15, 0.8};
 
 vehicle::TruckGeometry geometryOfTruck() {
   return vehicle::loadTruck(std::string(TUNNEL_PILOT_SOURCE_DIR) + "/config/truck.yaml").geometry;
@@ -25,7 +25,8 @@ YawResponse learned(double gain, double disturbance, double speed, double bends)
     motion.speed = speed;
     motion.articulation = bends * std::sin(0.3 * time);
     motion.articulation_rate = bends * 0.3 * std::cos(0.3 * time);
-    motion.yaw_rate = vehicle::yawRate(truck, 0.0, motion.articulation, motion.articulation_rate) +
+    motion.yaw_rate = kParameters.hinge_share *
+                          vehicle::yawRate(truck, 0.0, motion.articulation, motion.articulation_rate) +
                       gain * vehicle::yawRate(truck, speed, motion.articulation, 0.0) +
                       speed * disturbance;
     observer.update(motion, 0.0286);
@@ -37,6 +38,23 @@ TEST(YawObserver, LearnsGainAndDisturbanceInBends) {
   const YawResponse response = learned(0.85, 0.002, 3.0, 0.3);
   EXPECT_NEAR(response.gain, 0.85, 0.01);
   EXPECT_NEAR(response.disturbance, 0.002, 3e-4);
+}
+
+TEST(YawObserver, KnowsTheGainBeforeAReturnTurnsBack) {
+  // Turning in for 2 s at full rate, as after a wrong heading; the hinge's share is not the truck's
+  // gain.
+  const vehicle::TruckGeometry truck = geometryOfTruck();
+  YawObserver observer(kParameters, truck);
+  for (int i = 0; i < 100; ++i) {
+    Motion motion;
+    motion.speed = 2.0;
+    motion.articulation_rate = 0.26;
+    motion.articulation = 0.26 * 0.02 * i;
+    motion.yaw_rate = 1.15 * vehicle::yawRate(truck, motion.speed, motion.articulation, 0.0) +
+                      0.94 * vehicle::yawRate(truck, 0.0, motion.articulation, 0.26);
+    observer.update(motion, 0.02);
+  }
+  EXPECT_NEAR(observer.response().gain, 1.15, 0.03);
 }
 
 TEST(YawObserver, KeepsThePriorGainWhereNothingExcitesIt) {

@@ -26,7 +26,7 @@ DemonstrationParameters parameters() {
   p.lag = 0.26;
   p.label_after = p.seen_after + p.acts_after + p.lag;
   p.least_speed = 0.5;
-  p.yaw = {0.95, 0.15, 0.003, 100.0, 0.03, 1.0, 0.8};
+  p.yaw = {0.95, 0.15, 0.003, 0.94, 100.0, 0.04, 0.15, 0.8};
   return p;
 }
 

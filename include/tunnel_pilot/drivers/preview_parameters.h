@@ -36,6 +36,9 @@ struct PreviewDriverParameters {
   std::shared_ptr<const neural::NetworkFile> network;  ///< of the law by it; otherwise none
 };
 
+/// Reads and checks a map of weights. Throws config::ConfigError.
+PreviewWeights loadPreviewWeights(config::Node node);
+
 /// Reads and checks config/preview_driver.yaml, and the network's file if it is to drive; a relative
 /// file name is looked for from `folder`. A `law` given here takes the place of the file's. Throws
 /// config::ConfigError.

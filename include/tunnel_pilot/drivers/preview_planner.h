@@ -16,7 +16,8 @@ struct PreviewWeights {
   double slope;        ///< of the command's change over the way driven [m^2/rad^2]
   double slope_speed;  ///< lowest v that the slope is counted with [m/s]
   double terminal;     ///< factor on offset and heading at the horizon's end [1]
-  double rate_share;   ///< of max_rate that is planned with late in the horizon, up to slope_speed [1]
+  double rate_share;   ///< of max_rate that is planned with late in the horizon [1]
+  double sharp_speed;  ///< at which the sharpest bends are driven; faster, see rateLimit() [m/s]
 };
 
 /// Optimal preview: finds the command rates w over the horizon that minimise
@@ -73,11 +74,11 @@ class PreviewPlanner {
     const double v = std::max(speed, weights_.slope_speed);
     return weights_.slope / (v * v);
   }
-  /// Late in the horizon a share; beyond slope_speed, as much a metre of way as at that speed, squared:
-  /// a truck that comes faster will have slowed down before a bend that needs it.
+  /// Late in the horizon a share. A truck that comes faster than the sharpest bends are driven will have
+  /// slowed down before one of them: then more, as the squared speed.
   double rateLimit(std::size_t stage, double speed) const {
     const auto k = static_cast<double>(stage);
-    const double faster = std::max(1.0, speed / weights_.slope_speed);
+    const double faster = std::max(1.0, speed / weights_.sharp_speed);
     const double slowed = std::min(1.0, k / kSlowedDown) * (faster * faster - 1.0);
     return truck_.max_rate * std::max(weights_.rate_share, 1.0 - 0.10 * k) * (1.0 + slowed);
   }

@@ -27,8 +27,8 @@ YawObserverParameters loadYawObserver(config::Node node);
 ///   yaw rate = (g v sin(gamma) + h l_r gamma_dot) / (l_f cos(gamma) + l_r) + v d
 /// from gyro, articulation and speed, with a two-state Kalman filter whose state returns to the prior
 /// and whose uncertainty returns to the prior with the time `memory` (Ornstein-Uhlenbeck), so that it
-/// never winds up where nothing is excited. h is known: of what the turning hinge gives by kinematics, the
-/// tyres' slip takes a little away.
+/// never winds up where nothing is excited. h is known: of what the turning hinge gives by kinematics,
+/// the tyres' slip takes a little away.
 class YawObserver {
  public:
   YawObserver(const YawObserverParameters& parameters, const vehicle::TruckGeometry& geometry);
