@@ -184,6 +184,7 @@ BusState SocketCanBus::state() const {
 }
 
 std::string SocketCanBus::trouble() const {
+  if (state() != BusState::kDown && state() != BusState::kBusOff) return "";
   const std::string set = "ip link set " + interface_;
   if (!link_.present) return "there is no interface " + interface_;
   if (!open_) return interface_ + " cannot be opened: " + std::strerror(open_error_);

@@ -6,7 +6,9 @@
 #include <ros/ros.h>
 #include <sys/wait.h>
 
+#include <cstdio>
 #include <cstdlib>
+#include <map>
 #include <memory>
 
 #include "../drivers/random_network.h"
@@ -205,6 +207,51 @@ TEST(BadParameters, ANetworkByARelativePathOrABadOneIsRefused) {
       EXPECT_NE(std::string::npos, std::string(error.what()).find(told)) << error.what();
     }
   }
+}
+
+std::string refusalOfBridge(const std::string& name, const std::map<std::string, std::string>& bus) {
+  XmlRpcValue tree;
+  ros::NodeHandle().getParam("can_bridge", tree);
+  tree = without(tree, {"bus"});
+  for (const auto& [key, value] : bus) tree[key] = value;
+  const ros::NodeHandle private_nh(name);
+  private_nh.setParam(private_nh.getNamespace(), tree);
+  try {
+    start<CanBridgeRos>(private_nh);
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(BadParameters, ABridgeTakesOneBusAlone) {
+  const std::string both = refusalOfBridge("two_buses", {{"bus", "embedded"}, {"interface", "can0"}});
+  EXPECT_NE(std::string::npos, both.find("interface: there is a bus, too")) << both;
+}
+
+TEST(BadParameters, ABridgeRefusesAnInterfaceThatNoneCanBe) {
+  const std::string odd = refusalOfBridge("odd_interface", {{"interface", "can0; reboot"}});
+  EXPECT_NE(std::string::npos, odd.find("'can0; reboot'")) << odd;
+}
+
+// A process of its own, as use_sim_time is read at its start.
+TEST(BadParameters, ABridgeInSimulatedTimeDoesNotStartOnARealInterface) {
+  ros::NodeHandle nh;
+  XmlRpcValue tree;
+  nh.getParam("can_bridge", tree);
+  tree = without(tree, {"bus"});
+  tree["interface"] = "can0";
+  nh.setParam("simulated_bridge", tree);
+  nh.setParam("/use_sim_time", true);
+  FILE* node = popen("timeout 20 " TUNNEL_PILOT_NODE_FOLDER
+                     "/can_bridge __name:=simulated_bridge 2>&1; echo status $?",
+                     "r");
+  std::string said;
+  for (char part[256]; fgets(part, sizeof(part), node) != nullptr;) said += part;
+  pclose(node);
+  nh.deleteParam("/use_sim_time");
+  EXPECT_NE(std::string::npos, said.find("'can0' is not driven in simulated time")) << said;
+  EXPECT_NE(std::string::npos, said.find("status 1")) << said;
 }
 
 TEST(BadParameters, MarkersTakeNone) {
