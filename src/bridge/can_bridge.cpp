@@ -275,8 +275,7 @@ void CanBridge::listen(Stamp now) {
 }
 
 void CanBridge::clearBus(Stamp now) {
-  const bool holds = bus_.state() == can::BusState::kBusOff || bus_.inFlight() > 0;
-  if (!busFaulty() || !holds) return;
+  if (!busFaulty()) return;
   if (asked_to_discard_ && now - *asked_to_discard_ < kDiscardPeriod) return;
   asked_to_discard_ = now;
   bus_.discard();

@@ -154,6 +154,16 @@ TEST_P(SocketCanBridge, ABusThatGoesOffAgainAndAgainIsNotHurried) {
   EXPECT_GE(kernel.cycles, 10) << "but never given up";
 }
 
+TEST_P(SocketCanBridge, ATimeoutOfTheTransmitterWithNothingInFlightStopsAndIsCycled) {
+  rig.drive();
+  rig.run(0.1, [&] { return rig.bridge_bus->inFlight() == 0; });
+  const std::size_t sent = kernel.sent.size();
+  kernel.told(CAN_ERR_TX_TIMEOUT);
+  expectStop();
+  rig.run(2.0, [&] { return rig.bridge_bus->state() == can::BusState::kActive; });
+  expectRecovery(sent);
+}
+
 TEST_P(SocketCanBridge, LinkDownStopsAndUpIsBack) {
   rig.drive();
   kernel.down();

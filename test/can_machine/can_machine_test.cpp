@@ -217,6 +217,23 @@ TEST_F(CanMachine, WithoutTheHelperAStallWaitsForAnOperator) {
   row.print("stalled queue without the helper (from the operator's cycle)");
 }
 
+// Shows, too, that old frames are found where there are some.
+TEST_F(CanMachine, AQueueThatGoesOnByItselfSendsAtMostSixOldFramesAndIsNotTrusted) {
+  pilot = std::make_unique<Pilot>("/nowhere/can_link_cycle");
+  expectStop([] { provoke("stop_queue"); });
+  ASSERT_FALSE(HasFatalFailure());
+  pilot->run(1.0);
+  truck.takeWorstAge();
+  provoke("wake_queue");
+  pilot->run(0.5);
+  EXPECT_GE(pilot->bus->late(), 1u);
+  EXPECT_LE(pilot->bus->late(), 6u);
+  EXPECT_GE(truck.takeWorstAge(), 0.9);
+  EXPECT_FALSE(pilot->busWorks());
+  setLink("can0", false);
+  setLink("can0", true);
+}
+
 TEST_F(CanMachine, AForeignFrameFromTheBusStops) {
   expectStop([] {
     const auto other = can::openCanSocket("can1", "");
