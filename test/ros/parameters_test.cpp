@@ -6,7 +6,6 @@
 #include <ros/ros.h>
 #include <sys/wait.h>
 
-#include <cstdio>
 #include <cstdlib>
 #include <map>
 #include <memory>
@@ -17,6 +16,7 @@
 #include "tunnel_pilot/perception/scan_filter.h"
 #include "tunnel_pilot/perception/wall_segmentation.h"
 #include "tunnel_pilot/ros/arbiter_ros.h"
+#include "tunnel_pilot/ros/bus_choice.h"
 #include "tunnel_pilot/ros/can_bridge_ros.h"
 #include "tunnel_pilot/ros/centerline_ros.h"
 #include "tunnel_pilot/ros/lap_monitor.h"
@@ -234,24 +234,17 @@ TEST(BadParameters, ABridgeRefusesAnInterfaceThatNoneCanBe) {
   EXPECT_NE(std::string::npos, odd.find("'can0; reboot'")) << odd;
 }
 
-// A process of its own, as use_sim_time is read at its start.
-TEST(BadParameters, ABridgeInSimulatedTimeDoesNotStartOnARealInterface) {
-  ros::NodeHandle nh;
-  XmlRpcValue tree;
-  nh.getParam("can_bridge", tree);
-  tree = without(tree, {"bus"});
-  tree["interface"] = "can0";
-  nh.setParam("simulated_bridge", tree);
-  nh.setParam("/use_sim_time", true);
-  FILE* node = popen("timeout 20 " TUNNEL_PILOT_NODE_FOLDER
-                     "/can_bridge __name:=simulated_bridge 2>&1; echo status $?",
-                     "r");
-  std::string said;
-  for (char part[256]; fgets(part, sizeof(part), node) != nullptr;) said += part;
-  pclose(node);
-  nh.deleteParam("/use_sim_time");
-  EXPECT_NE(std::string::npos, said.find("'can0' is not driven in simulated time")) << said;
-  EXPECT_NE(std::string::npos, said.find("status 1")) << said;
+TEST(BadParameters, SimulatedTimeIsRefusedOnAnInterface) {
+  const ros::NodeHandle private_nh("simulated_bus");
+  private_nh.setParam("interface", "can0");
+  Parameters parameters(private_nh);
+  try {
+    takeBus(parameters, true);
+    ADD_FAILURE() << "accepted";
+  } catch (const config::ConfigError& error) {
+    EXPECT_NE(std::string::npos, std::string(error.what()).find("not driven in simulated time"))
+        << error.what();
+  }
 }
 
 TEST(BadParameters, MarkersTakeNone) {
