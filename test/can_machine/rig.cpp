@@ -63,7 +63,7 @@ Truck::~Truck() {
 double Truck::takeWorstAge() { return 1e-3 * static_cast<double>(worst_age_ms_.exchange(0)); }
 
 void Truck::run() {
-  const auto bus = join("can1", "");
+  const auto bus = join("can1", TUNNEL_PILOT_NODE_FOLDER "/can_link_cycle");
   const auto listener = join("can1", "");
   simulation::TruckController controller(simulation::loadTruckController(file("truck_controller.yaml")),
                                          *bus);
@@ -72,6 +72,7 @@ void Truck::run() {
     sleepUntil(next);
     const Stamp now = steadyTime();
     controller.step(standing, now);
+    if (bus->state() == can::BusState::kDown) bus->discard();
     while (const auto frame = listener->receive()) judge(*frame, now);
     next = std::max(next, now - milliseconds(2));
   }
