@@ -15,6 +15,7 @@ using S = SafetyState;
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kMaxFrameAngle = 45.0 * kPi / 180.0;  // the .dbc's range of ArticulationAngle [rad]
+constexpr Stamp kDiscardPeriod = std::chrono::milliseconds(500);  // a bus that stays off is not hurried
 constexpr double kRounding = 1e-6;  // beyond a limit, by arithmetic alone [rad], [m/s]
 
 // Reasons with which the arbiter tells that it drives on in less than full health. The others either
@@ -115,7 +116,9 @@ void CanBridge::setCommand(const Command& command, Stamp now) {
 }
 
 std::optional<std::string> CanBridge::whyUnhealthy(Stamp now) const {
-  if (const std::optional<Event> fault = anyFault(now)) return toString(*fault);
+  const std::optional<Event> fault = anyFault(now);
+  const std::string trouble = fault == Event::kBusFault ? bus_.trouble() : "";
+  if (fault) return toString(*fault) + (trouble.empty() ? "" : ": " + trouble);
   if (!lasts(healthy_since_, parameters_.health_time, now)) return "inputs not healthy for long enough";
   return std::nullopt;
 }
@@ -163,6 +166,8 @@ CanBridge::Answer CanBridge::reset(Stamp now) {
 void CanBridge::clockJumped(Stamp now) {
   link_.forgetTime();
   sender_.forgetTime();
+  transmit_.forgetTime(now);
+  asked_to_discard_.reset();
   odometry_.forgetTime();
   if (command_) command_->command.stamp = command_->at = Stamp::min() / 2;  // stale in any clock
   link_healthy_since_.reset();
@@ -178,11 +183,14 @@ void CanBridge::clockJumped(Stamp now) {
 
 // -------- what is wrong
 
-std::optional<Event> CanBridge::linkFault(Stamp now) const {
+bool CanBridge::busFaulty() const {
   const can::BusState bus = bus_.state();
-  if (bus == can::BusState::kBusOff || bus == can::BusState::kDown || sender_.broken()) {
-    return Event::kBusFault;
-  }
+  return bus == can::BusState::kBusOff || bus == can::BusState::kDown || transmit_.stalled() ||
+         sender_.broken();
+}
+
+std::optional<Event> CanBridge::linkFault(Stamp now) const {
+  if (busFaulty()) return Event::kBusFault;
   if (link_.foreignSender()) return Event::kForeignSender;
   if (link_.corrupt()) return Event::kFeedbackCorrupt;
   if (!link_.fresh(now)) return Event::kFeedbackStale;
@@ -256,12 +264,22 @@ void CanBridge::tick(Stamp now) {
 }
 
 void CanBridge::listen(Stamp now) {
-  if (!link_.receive(bus_, now)) return;
+  const bool news = link_.receive(bus_, now);
+  transmit_.update(bus_.inFlight(), now);
+  clearBus(now);
+  if (!news) return;
   const can::TruckFeedbackFrame& feedback = link_.feedback();
   std::optional<double> gyro;
   if (link_.fresh(now)) gyro = link_.motion().yaw_rate;
   odometry_.update(feedback.articulation_angle, feedback.articulation_rate, feedback.speed, gyro, now);
   if (feedback.autonomy_enabled && obeyed_) obeyed_ = now;
+}
+
+void CanBridge::clearBus(Stamp now) {
+  if (!busFaulty()) return;
+  if (asked_to_discard_ && now - *asked_to_discard_ < kDiscardPeriod) return;
+  asked_to_discard_ = now;
+  bus_.discard();
 }
 
 void CanBridge::advance(Stamp now) {
@@ -355,10 +373,12 @@ double CanBridge::limitedAngle(double wanted, bool steering, Stamp now) {
 }
 
 void CanBridge::sendIfDue(Stamp now) {
-  if (!sender_.due(stopBit(now), now)) return;
+  if (transmit_.full() || transmit_.stalled() || !sender_.due(stopBit(now), now)) return;
   const can::TruckCommandFrame command = composeCommand(now);
   const can::CommandInfoFrame info = composeInfo(now);
+  const std::uint64_t in_flight = bus_.inFlight();
   if (!sender_.send(command, info, composeStatus(now), bus_, now)) return;
+  transmit_.sent(std::max(bus_.inFlight(), in_flight) - in_flight, now);
   sent_angle_ = command.articulation_angle;
   steering_sent_ = command.steering_enable;
   sent_at_ = now;

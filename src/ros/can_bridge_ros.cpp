@@ -2,6 +2,7 @@
 
 #include <ros/console.h>
 
+#include "tunnel_pilot/ros/bus_choice.h"
 #include "tunnel_pilot/ros/conversions.h"
 #include "tunnel_pilot/ros/parameters.h"
 
@@ -16,9 +17,8 @@ constexpr Stamp kStatusPeriod = std::chrono::milliseconds(100);
 CanBridgeRos::CanBridgeRos(ros::NodeHandle nh, ros::NodeHandle private_nh) {
   Parameters parameters(private_nh);
   const auto truck = takeTruck(parameters);
-  const std::string bus = parameters.take({"bus"}).text("bus");
+  bus_ = takeBus(parameters, ros::Time::isSimTime());
   const auto bridge_parameters = bridge::loadBridge(parameters.rest());
-  bus_ = std::make_unique<can::EmbeddedBus>(bus);
   bridge_ = std::make_unique<bridge::CanBridge>(bridge_parameters, truck.geometry, *bus_);
 
   joint_publisher_ = nh.advertise<sensor_msgs::JointState>("joint_states", 5);
@@ -82,10 +82,23 @@ void CanBridgeRos::tick(Stamp now) {
   } else if (now - published_status_ >= kStatusPeriod) {
     publishStatus(now);
   }
+  tellTrouble();
   const auto& status = bridge_->status();
   if (status.transitions == told_transitions_) return;
   told_transitions_ = status.transitions;
   ROS_INFO("can_bridge: %s: %s", toString(status.state).c_str(), toString(status.reason).c_str());
+  diagnostics_->tell();
+}
+
+void CanBridgeRos::tellTrouble() {
+  const std::string trouble = bus_->trouble();
+  if (trouble == told_trouble_) return;
+  told_trouble_ = trouble;
+  if (trouble.empty()) {
+    ROS_INFO("can_bridge: the bus works");
+  } else {
+    ROS_ERROR("can_bridge: %s", trouble.c_str());
+  }
   diagnostics_->tell();
 }
 
@@ -125,6 +138,9 @@ void CanBridgeRos::fillStatus(Diagnostics::Status& status) const {
   status.add("frames received", s.frames_received);
   status.add("frames rejected", s.frames_rejected);
   status.add("frames sent", s.frames_sent);
+  status.add("frames confirmed", bus_->confirmed());
+  status.add("frames in flight", bus_->inFlight());
+  status.add("trouble with the bus", bus_->trouble());
   status.add("commands rejected", s.commands_rejected);
   status.add("last command rejection", s.command_rejection);
 }

@@ -64,13 +64,17 @@ void Judge::command(const can::Frame& frame, const BridgeStatus& status, Stamp l
 BridgeParameters Rig::bridgeParameters() { return loadBridge(file("can_bridge.yaml")); }
 vehicle::TruckParameters Rig::truckParameters() { return vehicle::loadTruck(file("truck.yaml")); }
 
-Rig::Rig(double tick)
+Rig::Rig(double tick) : Rig(tick, nullptr) {}
+
+Rig::Rig(double tick, const MakeBus& make_bus)
     : tick_period(tick), plant(truckParameters()), next_tick_(now), next_command_(now + ms(3)) {
-  bridge_bus = bridge_side.connect();
+  bridge_end = bridge_side.connect();
   wire_to_bridge = bridge_side.connect();
   truck_bus = truck_side.connect();
   wire_to_truck = truck_side.connect();
-  bridge = std::make_unique<CanBridge>(bridgeParameters(), truckParameters().geometry, *bridge_bus);
+  if (make_bus) bridge_bus = make_bus(*bridge_end);
+  bridge = std::make_unique<CanBridge>(bridgeParameters(), truckParameters().geometry,
+                                       bridge_bus ? *bridge_bus : *bridge_end);
   controller = std::make_unique<simulation::TruckController>(
       simulation::loadTruckController(file("truck_controller.yaml")), *truck_bus);
   plant.reset(geometry::Pose(), 0.0, 0.0);

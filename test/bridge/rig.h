@@ -41,6 +41,10 @@ class Rig {
  public:
   explicit Rig(double tick_period = 0.005);
 
+  /// With a bus of one's own between the bridge and its end of the wire.
+  using MakeBus = std::function<std::unique_ptr<can::Bus>(can::Bus& wire)>;
+  Rig(double tick_period, const MakeBus& make_bus);
+
   /// Runs for a time [s]; `until` ends it early (looked at every ms).
   void run(
       double seconds, const std::function<bool()>& until = [] { return false; });
@@ -77,7 +81,7 @@ class Rig {
   std::function<std::optional<can::Frame>(can::Frame)> to_truck = to_bridge;
 
   can::MemoryBusHub bridge_side, truck_side;
-  std::unique_ptr<can::Bus> bridge_bus, truck_bus, wire_to_bridge, wire_to_truck;
+  std::unique_ptr<can::Bus> bridge_end, bridge_bus, truck_bus, wire_to_bridge, wire_to_truck;
   std::unique_ptr<CanBridge> bridge;
   std::unique_ptr<simulation::TruckController> controller;
   vehicle::KinematicTruck plant;

@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 
 #include <cstdlib>
+#include <map>
 #include <memory>
 
 #include "../drivers/random_network.h"
@@ -15,6 +16,7 @@
 #include "tunnel_pilot/perception/scan_filter.h"
 #include "tunnel_pilot/perception/wall_segmentation.h"
 #include "tunnel_pilot/ros/arbiter_ros.h"
+#include "tunnel_pilot/ros/bus_choice.h"
 #include "tunnel_pilot/ros/can_bridge_ros.h"
 #include "tunnel_pilot/ros/centerline_ros.h"
 #include "tunnel_pilot/ros/lap_monitor.h"
@@ -204,6 +206,44 @@ TEST(BadParameters, ANetworkByARelativePathOrABadOneIsRefused) {
     } catch (const config::ConfigError& error) {
       EXPECT_NE(std::string::npos, std::string(error.what()).find(told)) << error.what();
     }
+  }
+}
+
+std::string refusalOfBridge(const std::string& name, const std::map<std::string, std::string>& bus) {
+  XmlRpcValue tree;
+  ros::NodeHandle().getParam("can_bridge", tree);
+  tree = without(tree, {"bus"});
+  for (const auto& [key, value] : bus) tree[key] = value;
+  const ros::NodeHandle private_nh(name);
+  private_nh.setParam(private_nh.getNamespace(), tree);
+  try {
+    start<CanBridgeRos>(private_nh);
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(BadParameters, ABridgeTakesOneBusAlone) {
+  const std::string both = refusalOfBridge("two_buses", {{"bus", "embedded"}, {"interface", "can0"}});
+  EXPECT_NE(std::string::npos, both.find("interface: there is a bus, too")) << both;
+}
+
+TEST(BadParameters, ABridgeRefusesAnInterfaceThatNoneCanBe) {
+  const std::string odd = refusalOfBridge("odd_interface", {{"interface", "can0; reboot"}});
+  EXPECT_NE(std::string::npos, odd.find("'can0; reboot'")) << odd;
+}
+
+TEST(BadParameters, SimulatedTimeIsRefusedOnAnInterface) {
+  const ros::NodeHandle private_nh("simulated_bus");
+  private_nh.setParam("interface", "can0");
+  Parameters parameters(private_nh);
+  try {
+    takeBus(parameters, true);
+    ADD_FAILURE() << "accepted";
+  } catch (const config::ConfigError& error) {
+    EXPECT_NE(std::string::npos, std::string(error.what()).find("not driven in simulated time"))
+        << error.what();
   }
 }
 

@@ -9,6 +9,7 @@
 #include "tunnel_pilot/bridge/odometry.h"
 #include "tunnel_pilot/bridge/safety_state.h"
 #include "tunnel_pilot/bridge/steering_watch.h"
+#include "tunnel_pilot/bridge/transmit_watch.h"
 #include "tunnel_pilot/bridge/truck_link.h"
 #include "tunnel_pilot/can/bus.h"
 #include "tunnel_pilot/drivers/driver.h"
@@ -55,6 +56,9 @@ struct BridgeStatus {
 /// otherwise it holds the articulation measured when it ceased to be. The last stage before the bus
 /// limits the rate of the angle, from the angle measured when steering was enabled. A stop is told
 /// within the call that asks for it.
+///
+/// When frames are not proven to be sent in time, or the bus is off, nothing is written any more and the
+/// bus is asked to discard what it holds, again and again, until it works: no frame is sent late.
 class CanBridge {
  public:
   CanBridge(const BridgeParameters& parameters, const vehicle::TruckGeometry& truck, can::Bus& bus);
@@ -106,6 +110,8 @@ class CanBridge {
   std::string whyRefused(const supervision::Command& command, Stamp now) const;
   std::uint32_t monotonous(std::uint32_t sequence);
   void listen(Stamp now);
+  void clearBus(Stamp now);
+  bool busFaulty() const;
   void advance(Stamp now);
   void watchInputs(Stamp now);
   void watchProgress(Stamp now);
@@ -130,6 +136,7 @@ class CanBridge {
   can::Bus& bus_;
   TruckLink link_;
   CommandSender sender_;
+  TransmitWatch transmit_;
   Odometry odometry_;
   SteeringWatch watch_;
   BridgeStatus status_;
@@ -138,6 +145,7 @@ class CanBridge {
   std::uint32_t sequence_offset_ = 0;  ///< added to the arbiter's numbers, so that they never decrease
   Stamp last_tick_{};
   Stamp entered_{};  ///< the present state
+  std::optional<Stamp> asked_to_discard_;
   std::optional<Stamp> link_healthy_since_;
   std::optional<Stamp> healthy_since_;  ///< all inputs
   std::optional<Stamp> undegraded_since_;

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
+#include <string>
 
 #include "tunnel_pilot/can/frame.h"
 
@@ -24,7 +26,18 @@ class Bus {
   /// Number of own frames whose transmission is proven (echo on a real bus).
   virtual std::uint64_t confirmed() const = 0;
 
+  /// Number of own frames taken whose fate is still open: they wait, or are being sent. The oldest is
+  /// settled first. Where sending is immediate there are none.
+  virtual std::uint64_t inFlight() const { return 0; }
+
+  /// Gives up all frames in flight, so that none of them is sent late: from here on state() tells kDown
+  /// or kBusOff until the bus is known to be rid of them. Nothing to do where sending is immediate.
+  virtual void discard() {}
+
   virtual BusState state() const = 0;
+
+  /// Why the bus does not work and what an operator must do, in words; empty while nothing is wrong.
+  virtual std::string trouble() const { return ""; }
 
   /// File descriptor that polls readable when frames wait, or -1 where there is none.
   virtual int descriptor() const = 0;

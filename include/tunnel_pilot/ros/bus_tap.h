@@ -4,6 +4,7 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "tunnel_pilot/can/bus.h"
@@ -24,7 +25,10 @@ class BusTap : public can::Bus {
   bool send(const can::Frame& frame) override { return bus_->send(frame); }
   std::optional<can::Frame> receive() override;
   std::uint64_t confirmed() const override { return bus_->confirmed(); }
+  std::uint64_t inFlight() const override { return bus_->inFlight(); }
+  void discard() override { bus_->discard(); }
   can::BusState state() const override { return bus_->state(); }
+  std::string trouble() const override { return bus_->trouble(); }
   int descriptor() const override { return bus_->descriptor(); }
 
   /// Takes in what waits on the bus, and returns how many counted frames have come since the start.

@@ -11,23 +11,24 @@
 #include <vector>
 
 #include "tunnel_pilot/bridge/can_bridge.h"
-#include "tunnel_pilot/can/embedded_bus.h"
+#include "tunnel_pilot/can/bus.h"
 #include "tunnel_pilot/ros/clock_watch.h"
 #include "tunnel_pilot/ros/diagnostics.h"
 #include "tunnel_pilot/ros/publisher_watch.h"
 
 namespace tunnel_pilot::shell {
 
-/// Shell of bridge::CanBridge on the embedded bus. Subscribes `command`; publishes `joint_states`
-/// (articulation_joint), `odom`, TF odom -> base_link for every feedback of the truck, and
-/// `truck_status` with each of them and at least ten times a second. Services engage, release, stop,
+/// Shell of bridge::CanBridge on an embedded bus or on SocketCAN. Subscribes `command`; publishes
+/// `joint_states` (articulation_joint), `odom`, TF odom -> base_link for every feedback of the truck,
+/// and `truck_status` with each of them and at least ten times a second. Services engage, release, stop,
 /// reset (std_srvs/Trigger): the message of a refusal says why.
 ///
 /// Time: without use_sim_time a steady timer of 200 Hz ticks the bridge; with it, each message of /clock
 /// does, so that a simulator in lockstep finds the bridge's frames at the same ticks in every run.
 ///
-/// Parameters: config/can_bridge.yaml, `truck_file` (path of the truck's YAML) and `bus` (name of the
-/// embedded bus). Throws config::ConfigError, and std::exception when the bus cannot be joined.
+/// Parameters: config/can_bridge.yaml, `truck_file` (path of the truck's YAML) and either `bus` (name of
+/// an embedded bus) or `interface` (of SocketCAN; never with use_sim_time). Throws config::ConfigError,
+/// and std::exception when the bus cannot be joined.
 class CanBridgeRos {
  public:
   CanBridgeRos(ros::NodeHandle nh, ros::NodeHandle private_nh);
@@ -40,6 +41,7 @@ class CanBridgeRos {
   void onCommand(const CommandEvent& event);
   void tick(Stamp now);
   Stamp current() const;
+  void tellTrouble();
   void publishMotion();
   void publishStatus(Stamp now);
   void advertiseEdge(ros::NodeHandle& nh, const std::string& name, Edge edge);
@@ -52,6 +54,7 @@ class CanBridgeRos {
   Stamp published_motion_{};
   Stamp published_status_{};
   std::uint32_t told_transitions_ = 0;
+  std::string told_trouble_;
 
   ros::Publisher joint_publisher_, odometry_publisher_, status_publisher_;
   tf2_ros::TransformBroadcaster transform_broadcaster_;

@@ -1,0 +1,193 @@
+#include "rig.h"
+
+#include <fcntl.h>
+#include <linux/if.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+#include "tunnel_pilot/can/layout.h"
+#include "tunnel_pilot/simulation/truck_controller.h"
+
+namespace tunnel_pilot::bridge {
+namespace {
+
+using std::chrono::milliseconds;
+constexpr Stamp kTick = milliseconds(5);
+constexpr Stamp kCommandPeriod = milliseconds(20);
+
+config::Node file(const std::string& name) {
+  return config::loadFile(std::string(TUNNEL_PILOT_SOURCE_DIR) + "/config/" + name);
+}
+
+std::unique_ptr<can::SocketCanBus> join(const std::string& interface, const std::string& helper) {
+  return std::make_unique<can::SocketCanBus>(interface, allIdentifiers(),
+                                             can::openCanSocket(interface, helper));
+}
+
+void sleepUntil(Stamp time) {
+  std::this_thread::sleep_until(std::chrono::steady_clock::time_point(time));
+}
+
+void writeTo(const std::string& path, const std::string& text) {
+  std::ofstream out(path);
+  out << text << std::flush;
+  if (!out) throw std::runtime_error("cannot write '" + text + "' to " + path);
+}
+
+}  // namespace
+
+Stamp steadyTime() { return Stamp(std::chrono::steady_clock::now().time_since_epoch()); }
+
+std::vector<can::Identifier> allIdentifiers() {
+  std::vector<can::Identifier> identifiers;
+  for (const can::FrameLayout& layout : can::frameLayouts()) identifiers.push_back({layout.id, false});
+  return identifiers;
+}
+
+// -------- Truck
+
+Truck::Truck() : thread_([this] { run(); }) {}
+
+Truck::~Truck() {
+  ends_ = true;
+  thread_.join();
+}
+
+double Truck::takeWorstAge() { return 1e-3 * static_cast<double>(worst_age_ms_.exchange(0)); }
+
+void Truck::run() {
+  const auto bus = join("can1", TUNNEL_PILOT_NODE_FOLDER "/can_link_cycle");
+  const auto listener = join("can1", "");
+  simulation::TruckController controller(simulation::loadTruckController(file("truck_controller.yaml")),
+                                         *bus);
+  const simulation::SensedTruck standing;
+  for (Stamp next = steadyTime(); !ends_; next += milliseconds(2)) {
+    sleepUntil(next);
+    const Stamp now = steadyTime();
+    controller.step(standing, now);
+    if (bus->state() == can::BusState::kDown) bus->discard();
+    while (const auto frame = listener->receive()) judge(*frame, now);
+    next = std::max(next, now - milliseconds(2));
+  }
+}
+
+void Truck::judge(const can::Frame& frame, Stamp now) {
+  const auto info = can::decode<can::CommandInfoFrame>(frame);
+  if (!info) return;
+  const auto now_ms = std::chrono::duration_cast<milliseconds>(now).count();
+  const std::int64_t age = static_cast<std::uint16_t>(now_ms - info->measurement_stamp_ms);
+  if (age > worst_age_ms_ && age < 60000) worst_age_ms_ = age;  // beyond: rounded from the future
+}
+
+// -------- Injection
+
+Injection::Injection(const std::function<void()>& act)
+    : thread_([this, act] {
+        begin_ = steadyTime().count();
+        act();
+        done_ = true;
+      }) {}
+
+// -------- Pilot
+
+Pilot::Pilot(const std::string& helper)
+    : bus(join("can0", helper)), next_tick_(steadyTime()), next_command_(next_tick_) {
+  bridge = std::make_unique<CanBridge>(loadBridge(file("can_bridge.yaml")),
+                                       vehicle::loadTruck(file("truck.yaml")).geometry, *bus);
+}
+
+bool Pilot::run(double seconds, const std::function<bool()>& until) {
+  const Stamp end = steadyTime() + fromSeconds(seconds);
+  while (!until()) {
+    if (steadyTime() >= end) return false;
+    step();
+  }
+  return true;
+}
+
+void Pilot::step() {
+  sleepUntil(next_tick_);
+  const Stamp now = steadyTime();
+  worst_delay_ = std::max(worst_delay_, toSeconds(now - next_tick_));
+  next_tick_ = std::max(next_tick_ + kTick, now);
+  if (now >= next_command_) {
+    next_command_ = std::max(next_command_ + kCommandPeriod, now);
+    supervision::Command command;
+    command.stamp = now;
+    command.sequence = sequence_++;
+    command.mode = supervision::Mode::kAutonomous;
+    command.source = supervision::Source::kPreviewDriver;
+    command.acceleration = 0.5;
+    bridge->setCommand(command, now);
+  }
+  bridge->tick(now);
+  if (isStop(state()) && !isStop(last_state_))
+    stopped_at = now;  // a truck that stands is STOPPED at once
+  if (isEngaged(state()) && !engaged_by_us) armed_by_itself = true;
+  if (!isEngaged(state())) engaged_by_us = false;
+  last_state_ = state();
+}
+
+bool Pilot::drive() {
+  const Stamp end = steadyTime() + std::chrono::seconds(10);
+  while (steadyTime() < end && state() != SafetyState::kActive) {
+    if (state() == SafetyState::kStopped) bridge->reset(steadyTime());
+    if (state() == SafetyState::kStandby && bridge->engage(steadyTime()).accepted) engaged_by_us = true;
+    step();
+  }
+  return state() == SafetyState::kActive;
+}
+
+bool Pilot::busWorks() const {
+  return bus->state() != can::BusState::kDown && bus->state() != can::BusState::kBusOff;
+}
+
+double Pilot::takeWorstDelay() { return std::exchange(worst_delay_, 0.0); }
+
+// -------- faults
+
+void provoke(const std::string& word) { writeTo("/sys/kernel/debug/can_fault", "can0 " + word); }
+
+void setLink(const std::string& interface, bool up) {
+  const int number = socket(PF_CAN, SOCK_RAW, 1);
+  ifreq request{};
+  interface.copy(request.ifr_name, IFNAMSIZ - 1);
+  bool good = ioctl(number, SIOCGIFFLAGS, &request) == 0;
+  request.ifr_flags = static_cast<short>(up ? request.ifr_flags | IFF_UP : request.ifr_flags & ~IFF_UP);
+  good = good && ioctl(number, SIOCSIFFLAGS, &request) == 0;
+  close(number);
+  if (!good) throw std::runtime_error("cannot set " + interface);
+}
+
+void configure(const std::string& interface) {
+  const std::string command = "ip link set " + interface + " type can bitrate 500000 restart-ms 0";
+  if (std::system(command.c_str()) != 0) throw std::runtime_error("failed: " + command);
+}
+
+void unplug(const std::string& interface) {
+  writeTo("/sys/class/net/" + interface + "/device/remove", "1");
+}
+
+void rescan() { writeTo("/sys/bus/pci/rescan", "1"); }
+
+void hangController(const std::string& interface) {
+  std::ifstream resources("/sys/class/net/" + interface + "/device/resource");
+  std::string line;
+  std::getline(resources, line);
+  std::getline(resources, line);  // the second holds the controller's registers
+  constexpr off_t kInterruptEnable = 4;
+  const int ports = open("/dev/port", O_WRONLY);
+  const off_t at = std::stol(line.substr(0, line.find(' ')), nullptr, 16) + kInterruptEnable;
+  const bool good = pwrite(ports, "\0", 1, at) == 1;
+  close(ports);
+  if (!good) throw std::runtime_error("cannot write to the controller of " + interface);
+}
+
+}  // namespace tunnel_pilot::bridge
