@@ -133,6 +133,7 @@ class Judge:
         self.stop_asked = None
         self.measured = {}  # source: time of its last good measurement
         self.too_fast_since = None
+        self.bus_broke = False  # since the last TP_COMMAND
         self.angle_history = deque()
 
     # ---- what happened off the bus
@@ -178,12 +179,13 @@ class Judge:
     def _foreign(self, _time, frame):
         self.foreign[frame.upper()] += 1
 
-    def _bus(self, _time, state):
+    def _bus(self, time, state):
         if state not in ('up', 'down'):
             raise ValueError('a bus is up or down')
         for identifier in self.pilot:
             self.streams[identifier].restart()
-        self.last = None
+        self.source_time = self.state_time = time
+        self.bus_broke = True
 
     def _clock(self, _time, offset):
         self.clock_offset = round(float(offset) * MS)
@@ -311,7 +313,8 @@ class Judge:
     def _check_angle(self, command, last):
         if abs(command.angle) > MAX_ANGLE:
             self._find(command.time, 'b', 'angle', f'{command.angle:.2f} deg', command.frame)
-        if last and last.steering:
+        gone, self.bus_broke = self.bus_broke and last and command.time - last.time > UNTOLD_LIMIT, False
+        if last and last.steering and not gone:
             turned = abs(command.angle - last.angle)
             elapsed = min(command.time - last.time, UNTOLD_LIMIT)
         elif self.angles:  # begins at the measured angle

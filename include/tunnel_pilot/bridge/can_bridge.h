@@ -50,11 +50,11 @@ struct BridgeStatus {
 /// nothing unchecked. Time is injected; no call throws or blocks after construction.
 ///
 /// Every frame_period the last command is sent again with a new alive counter; steering is enabled only
-/// in ACTIVE, DEGRADED and STOPPING, and only while the truck's frames are fresh and the operator has
-/// not taken over. A stop brakes while it steers: along the arbiter's command while that is fresh,
-/// otherwise it holds the articulation measured when it ceased to be. The last stage before the bus
-/// limits the rate of the angle, from the angle measured when steering was enabled. A stop is told
-/// within the call that asks for it.
+/// in ACTIVE, DEGRADED and a STOPPING that came of them, and only while the truck's frames are fresh and
+/// the operator has not taken over. A stop brakes while it steers: along the arbiter's command while
+/// that is fresh, otherwise it holds the articulation measured when it ceased to be. The last stage
+/// before the bus limits the angle's lateral acceleration and its rate, from the angle measured when
+/// steering was enabled. A stop is told within the call that asks for it.
 class CanBridge {
  public:
   CanBridge(const BridgeParameters& parameters, const vehicle::TruckGeometry& truck, can::Bus& bus);
@@ -119,6 +119,7 @@ class CanBridge {
   bool steeringEnabled(Stamp now) const;
   bool stopBit(Stamp now) const;
   double limitedAngle(double wanted, bool steering, Stamp now);
+  double widestAngle() const;
   void sendIfDue(Stamp now);
   can::TruckCommandFrame composeCommand(Stamp now);
   can::CommandInfoFrame composeInfo(Stamp now) const;
@@ -126,6 +127,7 @@ class CanBridge {
   void updateStatus(Stamp now);
 
   BridgeParameters parameters_;
+  vehicle::TruckGeometry truck_;
   double max_angle_;  ///< of a command [rad]
   can::Bus& bus_;
   TruckLink link_;
@@ -146,6 +148,7 @@ class CanBridge {
   std::optional<double> held_angle_;  ///< of a stop without a usable command [rad]
   double sent_angle_ = 0.0;           ///< [rad]
   Stamp sent_at_{};
+  bool stop_steers_ = false;    ///< the stop began while driving
   bool steering_sent_ = false;  ///< the last frame had steering enabled
 };
 
