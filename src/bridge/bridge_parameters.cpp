@@ -37,6 +37,7 @@ BridgeParameters loadBridge(config::Node node) {
   p.degraded_speed = node.number("degraded_speed", "m/s", 0.1, 1.5);
   p.stop_deceleration = node.number("stop_deceleration", "m/s^2", 0.5, p.max_acceleration);
   p.steering_rate = node.number("steering_rate", "rad/s", 0.01, 0.5);
+  p.max_lateral_acceleration = node.number("max_lateral_acceleration", "m/s^2", 0.1, 2.0);
   p.gyro_bias_time = node.number("gyro_bias_time", "s", 0.1, 60.0);
   p.tracking = loadTracking(node.child("tracking"));
   p.slip.compliance = node.number("slip_compliance", "rad s^2/m", 0.0, 0.1);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "tunnel_pilot/vehicle/articulation.h"
+
 namespace tunnel_pilot::bridge {
 namespace {
 
@@ -44,6 +46,8 @@ bool inside(double value, double min, double max) {
   return std::isfinite(value) && value >= min - kRounding && value <= max + kRounding;
 }
 
+bool drives(S state) { return state == S::kActive || state == S::kDegraded; }
+
 template <class Integer>
 Integer saturated(std::uint32_t count) {
   return static_cast<Integer>(std::min<std::uint32_t>(count, std::numeric_limits<Integer>::max()));
@@ -67,6 +71,7 @@ bool lasts(const std::optional<Stamp>& since, double seconds, Stamp now) {
 CanBridge::CanBridge(const BridgeParameters& parameters, const vehicle::TruckGeometry& truck,
                      can::Bus& bus)
     : parameters_(parameters),
+      truck_(truck),
       max_angle_(std::min(truck.max_articulation, kMaxFrameAngle)),
       bus_(bus),
       link_(parameters.feedback_timeout),
@@ -247,6 +252,7 @@ void CanBridge::raise(Event event, Stamp now, Reason carried) {
   const Transition* row = findTransition(status_.state, event);
   if (row == nullptr || (row->to == status_.state)) return;
   if (row->to != S::kStopped) status_.reason = row->reason.value_or(carried);
+  if (row->to == S::kStopping) stop_steers_ = drives(status_.state);
   status_.state = row->to;
   ++status_.transitions;
   entered_ = now;
@@ -306,7 +312,7 @@ void CanBridge::watchInputs(Stamp now) {
   if (any) raise(*any, now);
   // A fault of the truck may hide one of the command; each alone must stop.
   if (const auto fault = commandFault(now)) raise(*fault, now);
-  if (status_.state == S::kActive || status_.state == S::kDegraded) {
+  if (drives(status_.state)) {
     if (const auto fault = drivingFault(now)) raise(*fault, now);
   }
 }
@@ -352,8 +358,7 @@ bool CanBridge::standsStill(Stamp now) const {
 bool CanBridge::commandUsable(Stamp now) const { return !commandFault(now); }
 
 bool CanBridge::steeringEnabled(Stamp now) const {
-  const bool may =
-      status_.state == S::kActive || status_.state == S::kDegraded || status_.state == S::kStopping;
+  const bool may = drives(status_.state) || (status_.state == S::kStopping && stop_steers_);
   const can::TruckFeedbackFrame& feedback = link_.feedback();
   return may && link_.fresh(now) && feedback.operator_enable && !feedback.operator_override;
 }
@@ -362,14 +367,24 @@ bool CanBridge::stopBit(Stamp now) const {
   return isStop(status_.state) || (command_ && commandUsable(now) && command_->command.stop);
 }
 
-// Last stage before the codec: never faster than steering_rate, starting from the measured angle.
+// Last stage before the codec: no wider than the speed allows (a hold is what was measured), never
+// faster than steering_rate, starting from the measured angle.
 double CanBridge::limitedAngle(double wanted, bool steering, Stamp now) {
   const double measured = std::clamp(link_.feedback().articulation_angle, -max_angle_, max_angle_);
   if (!steering) return measured;
   const double from = steering_sent_ ? sent_angle_ : measured;
   const double elapsed = std::min(toSeconds(now - sent_at_), parameters_.frame_period);
   const double step = parameters_.steering_rate * std::max(elapsed, 0.0);
+  if (!held_angle_) wanted = std::clamp(wanted, -widestAngle(), widestAngle());
   return std::clamp(wanted, from - step, from + step);
+}
+
+// The widest angle that keeps to the lateral acceleration at the higher of the two speeds measured.
+double CanBridge::widestAngle() const {
+  const double speed =
+      std::max(std::abs(link_.feedback().speed), std::abs(link_.motion().front_axle_speed));
+  if (speed <= 0.0) return max_angle_;
+  return vehicle::steadyArticulation(truck_, parameters_.max_lateral_acceleration / (speed * speed));
 }
 
 void CanBridge::sendIfDue(Stamp now) {

@@ -15,22 +15,30 @@ constexpr double kSpeedIntegral = 0.5;    // ... who holds against rolling resis
 }  // namespace
 
 ClosedLoop::ClosedLoop(const Scenario& scenario, const Setup& setup, const PilotParameters& pilot,
-                       world::World world, std::uint64_t seed)
+                       world::World world, const EpisodePlan& plan)
     : truck_(setup.truck.geometry),
       truck_side_(hub_.connect()),
       pilot_side_(hub_.connect()),
       simulator_(setup.simulator, setup.truck_controller, setup.truck,
-                 makePlant(scenario.plant, setup.truck, seed), scenario.plant.load, std::move(world),
-                 seed, *truck_side_),
-      pilot_(pilot, setup.truck, *pilot_side_) {}
+                 makePlant(scenario.plant, setup.truck, plan.seed), scenario.plant.load,
+                 std::move(world), plan.seed, *truck_side_),
+      pilot_(pilot, setup.truck, *pilot_side_) {
+  if (plan.can_log == nullptr) return;
+  log_.emplace(*plan.can_log);
+  log_side_ = hub_.connect();
+  logEvent("start");
+}
 
 void ClosedLoop::step() {
+  const Stamp sent = simulator_.now();  // the truck's frames, at the beginning of the step
   const Simulator::Events& events = simulator_.step();
+  logFrames(sent);
   if (events.scan != nullptr) takeScan(*events.scan);
   if (simulator_.now() >= next_tick_) {
     pilot_.tick(simulator_.now());
     next_tick_ += fromSeconds(1.0 / Pilot::kTickRate);
   }
+  logPilot();
   if (!events.truth || !driving_) return;
   record();
   takeTruth();
@@ -54,6 +62,8 @@ bool ClosedLoop::handOver(const geometry::Pose& start, double speed) {
     if (!accepted && now >= next_try) {
       accepted = pilot_.engage(simulator_.now()).accepted;
       next_try = now + kEngageRetry;
+      if (accepted) logEvent("engage");
+      logPilot();
     }
     if (rolling) driveUp(speed);
     step();
@@ -63,6 +73,31 @@ bool ClosedLoop::handOver(const geometry::Pose& start, double speed) {
   start_time_ = simulator_.now();
   start_contacts_ = simulator_.truth().contacts;
   return true;
+}
+
+void ClosedLoop::logEvent(const std::string& words) {
+  if (log_) log_->event(words, simulator_.now());
+}
+
+// A scan serves whoever proposes; that it was good is the pilot's to find out.
+void ClosedLoop::logMeasurement(Stamp stamp) {
+  const double age = 1e3 * toSeconds(simulator_.now() - stamp);  // [ms]
+  for (const char* source : {"lidar_driver", "preview_driver"}) {
+    logEvent(std::string("measurement ") + source + " " + std::to_string(age));
+  }
+}
+
+void ClosedLoop::logPilot() {
+  if (!log_) return;
+  const bool stop = pilot_.decision().command.stop;
+  if (stop && !stop_commanded_) logEvent("command_stop");
+  stop_commanded_ = stop;
+  logFrames(simulator_.now());
+}
+
+void ClosedLoop::logFrames(Stamp when) {
+  if (!log_) return;
+  while (const std::optional<can::Frame> frame = log_side_->receive()) log_->frame(*frame, when);
 }
 
 void ClosedLoop::record() {

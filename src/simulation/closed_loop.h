@@ -1,9 +1,11 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "experiments.h"
+#include "tunnel_pilot/can/log_writer.h"
 #include "tunnel_pilot/can/memory_bus.h"
 
 namespace tunnel_pilot::simulation {
@@ -12,7 +14,7 @@ namespace tunnel_pilot::simulation {
 class ClosedLoop {
  public:
   ClosedLoop(const Scenario& scenario, const Setup& setup, const PilotParameters& pilot,
-             world::World world, std::uint64_t seed);
+             world::World world, const EpisodePlan& plan);
   virtual ~ClosedLoop() = default;
 
  protected:
@@ -30,6 +32,9 @@ class ClosedLoop {
   /// Called with every new truth once the truck obeys.
   void record();
 
+  /// Tells the log that a measurement of this stamp is about to be taken.
+  void logMeasurement(Stamp stamp);
+
   /// Why the drive cannot go on, in words; empty while it can.
   std::string whyOver(double time_limit) const;
 
@@ -46,7 +51,13 @@ class ClosedLoop {
 
  private:
   void driveUp(double speed);
+  void logEvent(const std::string& words);
+  void logPilot();             ///< a stop it asked for, then its frames
+  void logFrames(Stamp when);  ///< all that waits
 
+  std::optional<can::LogWriter> log_;
+  std::unique_ptr<can::Bus> log_side_;  ///< listens, where there is a log
+  bool stop_commanded_ = false;
   double missed_way_ = 0.0;  ///< speed error integrated while driving up [m]
   Stamp next_tick_{};
   Stamp start_time_{};

@@ -19,7 +19,7 @@ class Drive : public ClosedLoop {
   Drive(const DriveExperiment& drive, const Scenario& scenario, const Setup& setup,
         const EpisodePlan& plan, DriveObserver* observer)
       : ClosedLoop(scenario, setup, withTopSpeed(setup.pilot, drive.top_speed),
-                   world::loadWorld(drive.world_file, {plan.seed, plan.reversed}), plan.seed),
+                   world::loadWorld(drive.world_file, {plan.seed, plan.reversed}), plan),
         drive_(drive),
         sight_(setup.pilot.perception.wall_segmentation.lookahead),
         acceleration_(setup.pilot.arbiter.limiter.max_acceleration),
@@ -49,6 +49,7 @@ class Drive : public ClosedLoop {
 
  private:
   void takeScan(const geometry::Scan& scan) override {
+    logMeasurement(scan.stamp);
     pilot_.takeScan(scan, simulator_.now());
     if (!driving_) return;
     const Truth& truth = simulator_.truthOfScan();

@@ -41,7 +41,7 @@ EpisodeResult runExperiment(const Scenario& scenario, const Setup& setup, const 
         } else if constexpr (std::is_same_v<Kind, SteadyTurnExperiment>) {
           return runSteadyTurn(experiment, scenario, setup, plan.seed);
         } else if constexpr (std::is_same_v<Kind, LaneChangeExperiment>) {
-          return runLaneChange(experiment, scenario, setup, plan.seed, observer);
+          return runLaneChange(experiment, scenario, setup, plan, observer);
         } else {
           return runPerception(experiment, setup, plan.seed, plan.reversed);
         }

@@ -21,7 +21,7 @@ EpisodeResult runDrive(const DriveExperiment& drive, const Scenario& scenario, c
 EpisodeResult runSteadyTurn(const SteadyTurnExperiment& turn, const Scenario& scenario,
                             const Setup& setup, std::uint64_t seed);
 EpisodeResult runLaneChange(const LaneChangeExperiment& change, const Scenario& scenario,
-                            const Setup& setup, std::uint64_t seed, DriveObserver* observer);
+                            const Setup& setup, const EpisodePlan& plan, DriveObserver* observer);
 EpisodeResult runPerception(const PerceptionExperiment& experiment, const Setup& setup,
                             std::uint64_t seed, bool reversed);
 

@@ -44,10 +44,10 @@ geometry::PathPoint prolongedAt(const geometry::Path& path, double s) {
 class LaneChange : public ClosedLoop {
  public:
   LaneChange(const LaneChangeExperiment& change, const Scenario& scenario, const Setup& setup,
-             std::uint64_t seed, DriveObserver* observer)
-      : ClosedLoop(scenario, setup, withFixedSpeed(setup.pilot, change.speed), openGround(change), seed),
+             const EpisodePlan& plan, DriveObserver* observer)
+      : ClosedLoop(scenario, setup, withFixedSpeed(setup.pilot, change.speed), openGround(change), plan),
         change_(change),
-        noise_(seed, Stream::kSensedPath),
+        noise_(plan.seed, Stream::kSensedPath),
         observer_(observer) {}
 
   EpisodeResult run() {
@@ -71,6 +71,7 @@ class LaneChange : public ClosedLoop {
 
  private:
   void takeScan(const geometry::Scan& scan) override {
+    logMeasurement(scan.stamp);
     pilot_.takeTunnel(sensed(simulator_.truthOfScan(), scan.stamp), simulator_.now());
     if (driving_ && observer_ != nullptr) observer_->afterScan(simulator_, pilot_);
   }
@@ -119,8 +120,8 @@ class LaneChange : public ClosedLoop {
 }  // namespace
 
 EpisodeResult runLaneChange(const LaneChangeExperiment& change, const Scenario& scenario,
-                            const Setup& setup, std::uint64_t seed, DriveObserver* observer) {
-  return LaneChange(change, scenario, setup, seed, observer).run();
+                            const Setup& setup, const EpisodePlan& plan, DriveObserver* observer) {
+  return LaneChange(change, scenario, setup, plan, observer).run();
 }
 
 }  // namespace tunnel_pilot::simulation

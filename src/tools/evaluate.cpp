@@ -7,10 +7,13 @@
 #include <cstdint>
 #include <cstdio>
 #include <exception>
+#include <fstream>
 #include <iostream>
 #include <map>
+#include <stdexcept>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "tunnel_pilot/simulation/episode.h"
@@ -30,6 +33,7 @@ struct Arguments {
   std::string config;
   std::string driver;
   std::string network;
+  std::string can_log;
   long long first_seed = -1;  // -1: the scenario's
   int seeds = 0;
   int jobs = 1;
@@ -63,6 +67,8 @@ bool parse(int argc, char** argv, Arguments& arguments) {
       "who proposes: preview_driver, lidar_driver, or all (lidar_driver steers while it is sure)")(
       "network", options::value(&arguments.network)->value_name("FILE"),
       "lidar_driver's network instead of the one that config/lidar_driver.yaml names")(
+      "can-log", options::value(&arguments.can_log)->value_name("FILE"),
+      "writes the first episode's CAN bus and its events (candump -L)")(
       "jobs", options::value(&arguments.jobs)->default_value(1)->value_name("N"), "threads");
   options::positional_options_description positional;
   positional.add("scenario", -1);
@@ -80,6 +86,9 @@ bool parse(int argc, char** argv, Arguments& arguments) {
   if (values.count("first-seed") != 0 &&
       (arguments.first_seed < 0 || arguments.first_seed > 1'000'000'000)) {
     throw options::error("--first-seed must be 0 to 1000000000");
+  }
+  if (!arguments.can_log.empty() && arguments.scenarios.size() > 1) {
+    throw options::error("--can-log takes one scenario");
   }
   if (arguments.jobs < 1 || arguments.jobs > 256) throw options::error("--jobs must be 1 to 256");
   const simulation::DriverChoice driver = driverOf(arguments);
@@ -145,6 +154,18 @@ std::string networkLine(const neural::NetworkFile& network,
   return "Network " + network.name + " " + network.sha256.substr(0, 12) + text;
 }
 
+// Opens the log of the first episode's bus. Throws std::runtime_error.
+std::ofstream openCanLog(const std::string& file, const simulation::Scenario& scenario) {
+  const auto& experiment = scenario.experiment;
+  if (!std::holds_alternative<simulation::DriveExperiment>(experiment) &&
+      !std::holds_alternative<simulation::LaneChangeExperiment>(experiment)) {
+    throw std::runtime_error("--can-log: there is no bus in " + scenario.name);
+  }
+  std::ofstream log(file);
+  if (!log) throw std::runtime_error("--can-log: cannot write " + file);
+  return log;
+}
+
 // True when every goal of the scenario holds.
 bool evaluate(const std::string& file, const Arguments& arguments) {
   simulation::Scenario scenario = simulation::loadScenario(file);
@@ -153,7 +174,12 @@ bool evaluate(const std::string& file, const Arguments& arguments) {
   const int seeds = arguments.seeds > 0 ? arguments.seeds : scenario.seeds;
   simulation::Setup setup = simulation::loadSetup(scenario);
   simulation::chooseDriver(scenario, driverOf(arguments), arguments.network, setup);
-  const auto plans = simulation::episodePlans(scenario, seeds);
+  auto plans = simulation::episodePlans(scenario, seeds);
+  std::ofstream can_log;
+  if (!arguments.can_log.empty()) {
+    can_log = openCanLog(arguments.can_log, scenario);
+    plans.front().can_log = &can_log;
+  }
   const std::string folder = arguments.out.empty() ? "" : arguments.out + "/" + scenario.name;
   if (!folder.empty())
     simulation::makeReportFolder(folder);  // one that cannot be is told before the runs
@@ -162,6 +188,9 @@ bool evaluate(const std::string& file, const Arguments& arguments) {
   const auto start = std::chrono::steady_clock::now();
   const auto episodes = simulation::runEpisodes(scenario, setup, plans, arguments.jobs,
                                                 [&](std::size_t done) { progress.show(done); });
+  if (can_log.is_open() && !can_log.flush()) {
+    throw std::runtime_error("--can-log: cannot write " + arguments.can_log);
+  }
   const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
   const simulation::Evaluation evaluation = simulation::judge(scenario, episodes);

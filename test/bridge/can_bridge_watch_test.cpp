@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "rig.h"
+#include "tunnel_pilot/vehicle/articulation.h"
 
 // Every watchdog: what it finds, how fast in virtual time, and what it leaves alone.
 namespace tunnel_pilot::bridge {
@@ -39,6 +40,29 @@ class Watchdog : public testing::TestWithParam<double> {
   Rig rig;
 };
 INSTANTIATE_TEST_SUITE_P(Ticks, Watchdog, testing::Values(0.001, 0.020));
+
+TEST_P(Watchdog, StopThatNobodyEngagedBeforeDoesNotSteer) {
+  rig.run(1.5);
+  ASSERT_EQ(rig.state(), SafetyState::kStandby);
+  rig.plant.reset(geometry::Pose(), 0.0, 3.0);  // rolling, so that the stop lasts
+  rig.run(0.05);
+  rig.bridge->stop(rig.now);
+  rig.run(0.2);
+  ASSERT_EQ(rig.state(), SafetyState::kStopping);
+  for (const can::TruckCommandFrame& frame : rig.judge.commands) EXPECT_FALSE(frame.steering_enable);
+  EXPECT_TRUE(rig.judge.last->stop);
+}
+
+TEST_P(Watchdog, CommandTooWideForTheSpeedIsHeldToTheLateralAcceleration) {
+  rig.drive(6.0);
+  rig.command.articulation_angle = 40.0 * kDeg;
+  rig.run(2.0);
+  const double speed = rig.plant.state().speed;
+  const double widest =
+      vehicle::steadyArticulation(Rig::truckParameters().geometry, 2.0 / (speed * speed));
+  EXPECT_NEAR(rig.judge.last->articulation_angle, widest, 0.5 * kDeg);
+  EXPECT_EQ(rig.state(), SafetyState::kActive);
+}
 
 TEST_P(Watchdog, CommandStale) {
   rig.drive();

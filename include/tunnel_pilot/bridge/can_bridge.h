@@ -51,11 +51,11 @@ struct BridgeStatus {
 /// nothing unchecked. Time is injected; no call throws or blocks after construction.
 ///
 /// Every frame_period the last command is sent again with a new alive counter; steering is enabled only
-/// in ACTIVE, DEGRADED and STOPPING, and only while the truck's frames are fresh and the operator has
-/// not taken over. A stop brakes while it steers: along the arbiter's command while that is fresh,
-/// otherwise it holds the articulation measured when it ceased to be. The last stage before the bus
-/// limits the rate of the angle, from the angle measured when steering was enabled. A stop is told
-/// within the call that asks for it.
+/// in ACTIVE, DEGRADED and a STOPPING that came of them, and only while the truck's frames are fresh and
+/// the operator has not taken over. A stop brakes while it steers: along the arbiter's command while
+/// that is fresh, otherwise it holds the articulation measured when it ceased to be. The last stage
+/// before the bus limits the angle's lateral acceleration and its rate, from the angle measured when
+/// steering was enabled. A stop is told within the call that asks for it.
 ///
 /// When frames are not proven to be sent in time, or the bus is off, nothing is written any more and the
 /// bus is asked to discard what it holds, again and again, until it works: no frame is sent late.
@@ -125,6 +125,7 @@ class CanBridge {
   bool steeringEnabled(Stamp now) const;
   bool stopBit(Stamp now) const;
   double limitedAngle(double wanted, bool steering, Stamp now);
+  double widestAngle() const;
   void sendIfDue(Stamp now);
   can::TruckCommandFrame composeCommand(Stamp now);
   can::CommandInfoFrame composeInfo(Stamp now) const;
@@ -132,6 +133,7 @@ class CanBridge {
   void updateStatus(Stamp now);
 
   BridgeParameters parameters_;
+  vehicle::TruckGeometry truck_;
   double max_angle_;  ///< of a command [rad]
   can::Bus& bus_;
   TruckLink link_;
@@ -154,6 +156,7 @@ class CanBridge {
   std::optional<double> held_angle_;  ///< of a stop without a usable command [rad]
   double sent_angle_ = 0.0;           ///< [rad]
   Stamp sent_at_{};
+  bool stop_steers_ = false;    ///< the stop began while driving
   bool steering_sent_ = false;  ///< the last frame had steering enabled
 };
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <ostream>
 #include <vector>
 
 #include "tunnel_pilot/simulation/pilot.h"
@@ -39,6 +40,7 @@ std::unique_ptr<vehicle::Plant> makePlant(const PlantChoice& choice,
 struct EpisodePlan {
   std::uint64_t seed;
   bool reversed;
+  std::ostream* can_log = nullptr;  ///< takes the bus's log (docs/can.md); drives and lane changes
 };
 
 /// All episodes of a scenario: `seeds` seeds from its first one, each in the directions it asks for.

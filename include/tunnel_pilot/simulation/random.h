@@ -23,6 +23,7 @@ enum class Stream : std::uint64_t {
   kArticulationRate = 11,
   kScene = 12,
   kTraining = 13,
+  kFaults = 14,
 };
 
 /// Seed of one stream of one scenario seed (SplitMix64 of both, Steele, Lea & Flood 2014).
