@@ -42,6 +42,10 @@ class Cook {
     setup_.pilot.driver = simulation::DriverChoice::kLidarDriver;
     // An unsure beginner shall go on, to be shown better.
     for (supervision::SourceRule& rule : setup_.pilot.arbiter.sources) rule.min_confidence = 0.0;
+    // A network that is not told of a slow steering can make nothing of labels that are for one.
+    if (recipe.design.truck == NetworkDesign::Truck::kAll) return;
+    for (SceneSource& source : recipe_.scenes) source.spread.slower = 0.0;
+    setup_.pilot.lidar_driver.steering.rate_change = 0.0;
   }
 
   neural::NetworkFile run(const DataSet* data) {
@@ -162,7 +166,7 @@ class Cook {
     return words;
   }
 
-  const Recipe& recipe_;
+  Recipe recipe_;
   int jobs_;
   std::function<void(const std::string&)> tell_;
   simulation::Setup setup_;
