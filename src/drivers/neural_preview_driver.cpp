@@ -63,7 +63,8 @@ Proposal NeuralPreviewDriver::propose(const perception::Tunnel& tunnel, const Mo
   const double corrected = start->articulation + parameters_.network_law.correction_time *
                                                      turnTowards(wanted, start->articulation, speed);
   if (!std::isfinite(corrected)) return proposal;
-  const double most = predictor_.truck().max_rate * elapsed;
+  const double most =
+      parameters_.truck.steering.max_rate * elapsed;  // nothing is planned with a slower one
 
   proposal.valid = true;
   proposal.articulation_angle =
@@ -103,7 +104,8 @@ double NeuralPreviewDriver::turnTowards(double wanted, double articulation, doub
       speed *
       ((wanted / (front + rear) - learned.disturbance) * arm - learned.gain * std::sin(articulation)) /
       rear;
-  return std::clamp(rate, -truck.max_rate, truck.max_rate);
+  const double most = parameters_.truck.steering.max_rate;
+  return std::clamp(rate, -most, most);
 }
 
 }  // namespace tunnel_pilot::drivers
