@@ -385,7 +385,8 @@ TEST(OdometryMessage, HasTheCovarianceOfWhatIsMeasured) {
   vehicle::TruckGeometry truck{};
   truck.front_axle_to_hinge = 2.0;
   truck.rear_axle_to_hinge = 3.0;
-  bridge::Odometry odometry(truck, 2.0, 0.05, {0.005, 0.01, 0.02, 0.001, 0.001, 0.0, 0.005});
+  bridge::Odometry odometry(truck, 2.0, 0.05, {0.005, 0.01, 0.02, 0.001, 0.001, 0.0, 0.005},
+                            {0.02, {1.0, 0.0, 0.0, 1.0, 100.0, 0.04, 0.15, 0.8}});
   for (int i = 0; i <= 100; ++i) odometry.update(0.0, 0.0, 3.0, 0.0, fromSeconds(0.02 * i));
   const auto message = toRos(odometry);
   EXPECT_NEAR(0.06, std::sqrt(message.pose.covariance[0]), 0.002) << "1 % of 6 m";
