@@ -56,7 +56,7 @@ TEST(BridgeParameters, EveryKeyIsNeededAndOfTheRightKind) {
     }
     ++keys;
   }
-  EXPECT_EQ(keys, 23);
+  EXPECT_EQ(keys, 24);
   YAML::Node unknown = YAML::Clone(good);
   unknown["typo"] = 1;
   EXPECT_TRUE(refused(unknown, "typo"));

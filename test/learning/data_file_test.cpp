@@ -142,7 +142,7 @@ TEST_F(DataFile, BadFilesAreRefusedWithTheReason) {
       {"[1, 2]\n", "not a data set"},
       {"{}\n", "format"},
       {replaced("tunnel_pilot_data_set", "another"), "format"},
-      {replaced("\"version\": 1", "\"version\": 2"), "version"},
+      {replaced("\"version\": 2", "\"version\": 1"), "version"},
       {replaced("\"count\": 761", "\"count\": 760"), "count"},
       {replaced("\"unit\": \"m/s\"", "\"unit\": \"km/h\""), "unit"},
       {replaced("\"name\": \"speed\"", "\"name\": \"haste\""), "name"},
