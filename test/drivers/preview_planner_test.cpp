@@ -18,7 +18,8 @@ vehicle::TruckGeometry geometryOfTruck() {
 }
 
 PreviewPlanner planner(double rate_share = 1.0) {
-  return {{geometryOfTruck(), 0.2, kMaxRate, 0.75, 0.0}, {4.0, 2.0, 6.0, 3.0, 5.0, rate_share, 3.0}, kStep};
+  return {
+      {geometryOfTruck(), 0.2, kMaxRate, 0.75, 0.0}, {4.0, 2.0, 6.0, 3.0, 5.0, rate_share, 3.0}, kStep};
 }
 
 geometry::Path straight() { return geometry::buildPath({{60.0, 0.0, 0.0}}, {}, 0.5); }
