@@ -1,5 +1,6 @@
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <memory>
 
 #include "in_parallel.h"
@@ -18,7 +19,7 @@ constexpr std::uint64_t kSeedsOfASource = 1000;
 constexpr double kDegrees = 57.29577951308232;
 constexpr std::uint32_t kHeldOutShare = 5;  // of data from files, every so many tunnels
 
-void append(DataSet& to, DataSet from) {
+void moveInto(DataSet& to, DataSet from) {
   to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
 }
 
@@ -68,9 +69,20 @@ class Cook {
   }
 
  private:
+  // Every fifth of the tunnels that there are is held out, and one at least.
   void split(const DataSet& data) {
+    std::map<std::uint32_t, std::uint32_t> order;
+    for (const Example& example : data) order.emplace(example.tunnel, 0);
+    if (order.size() < 2) {
+      throw config::ConfigError(
+          "the recorded drives are all of one tunnel: some must be held out. Extract several bags, or "
+          "one "
+          "with --tunnel-length");
+    }
+    std::uint32_t next = 0;
+    for (auto& [tunnel, number] : order) number = next++;
     for (const Example& example : data) {
-      (example.tunnel % kHeldOutShare == 0 ? held_out_ : examples_).push_back(example);
+      (order.at(example.tunnel) % kHeldOutShare == 0 ? held_out_ : examples_).push_back(example);
     }
     tell_(text("%zu examples, %zu more held out", examples_.size(), held_out_.size()));
   }
@@ -85,7 +97,8 @@ class Cook {
         sets[i] = sampleScenes(source.world_file, seed, source.examples, setup_, source.spread);
       });
       for (std::size_t i = 0; i < all; ++i) {
-        append(i < static_cast<std::size_t>(source.tunnels) ? examples_ : held_out_, std::move(sets[i]));
+        moveInto(i < static_cast<std::size_t>(source.tunnels) ? examples_ : held_out_,
+                 std::move(sets[i]));
       }
     }
     tell_(text("%zu scenes, %zu more held out", examples_.size(), held_out_.size()));
@@ -122,7 +135,7 @@ class Cook {
     // The last tunnels of each round are held out.
     const std::uint64_t held_out_from = first + static_cast<std::uint64_t>(source.tunnels) - 1;
     for (std::size_t i = 0; i < plans.size(); ++i) {
-      append(plans[i].seed >= held_out_from ? held_out_ : examples_, std::move(sets[i]));
+      moveInto(plans[i].seed >= held_out_from ? held_out_ : examples_, std::move(sets[i]));
     }
   }
 

@@ -9,6 +9,9 @@ namespace {
 
 // Components with less than this share of the greatest variance are no more amplified.
 constexpr float kLeastVariance = 1e-7F;
+// A single input that varies less than this among the examples tells nothing: a weight would be left as
+// it was drawn, and act on whatever the input is later.
+constexpr float kLeastSingleVariance = 1e-6F;
 
 }  // namespace
 
@@ -30,7 +33,9 @@ InputProjection::InputProjection(const Eigen::MatrixXf& inputs, std::size_t beam
   }
   for (Eigen::Index i = b; i < rows; ++i) {
     const float variance = centred.row(i).squaredNorm() / static_cast<float>(inputs.cols());
-    basis_(k + i - b, i) = 1.0F / std::sqrt(variance + 1e-6F);
+    if (variance > kLeastSingleVariance) {
+      basis_(k + i - b, i) = 1.0F / std::sqrt(variance + kLeastSingleVariance);
+    }
   }
 }
 

@@ -1,11 +1,9 @@
 // train: makes a network as a recipe says, from simulated drives or from recorded ones.
-#include <algorithm>
 #include <boost/program_options.hpp>
 #include <chrono>
 #include <cstdio>
 #include <exception>
 #include <iostream>
-#include <iterator>
 #include <string>
 #include <vector>
 
@@ -57,10 +55,7 @@ void train(const Arguments& arguments) {
   const auto start = std::chrono::steady_clock::now();
   const learning::Recipe recipe = learning::loadRecipe(arguments.recipe);
   learning::DataSet data;
-  for (const std::string& file : arguments.data) {
-    learning::DataSet more = learning::readDataSet(file);
-    data.insert(data.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
-  }
+  for (const std::string& file : arguments.data) learning::append(data, learning::readDataSet(file));
   const learning::DataSet* recorded = arguments.data.empty() ? nullptr : &data;
   neural::NetworkFile network =
       learning::follow(recipe, recorded, arguments.jobs, [&](const std::string& line) {

@@ -137,6 +137,30 @@ TEST(InputProjection, TheUnfoldedLayerSaysOfRawInputsWhatTheInnerSaysOfComponent
   }
 }
 
+TEST(InputProjection, AnInputThatNeverVariedGetsNoWeight) {
+  Eigen::MatrixXf inputs = 0.3F * Eigen::MatrixXf::Random(40, 200).array() + 0.5F;
+  inputs.row(38).setConstant(0.7F);
+  const InputProjection projection(inputs, 36, 10);
+  neural::Network inner({neural::Layer::dense(14, 5, neural::Activation::kTanh)});
+  inner.randomise(3);
+  neural::Network outer({neural::Layer::dense(40, 5, neural::Activation::kTanh)});
+  projection.unfold(inner, outer);
+  for (std::size_t h = 0; h < 5; ++h) {
+    EXPECT_EQ(outer.parameters()[h * 40 + 38], 0.0);
+    EXPECT_NE(outer.parameters()[h * 40 + 39], 0.0);
+  }
+}
+
+TEST(DataSet, TunnelsOfAnotherSetGetNumbersOfTheirOwn) {
+  DataSet all(3), other(2);
+  all[2].tunnel = 4;
+  other[1].tunnel = 1;
+  append(all, other);
+  ASSERT_EQ(all.size(), 5U);
+  EXPECT_EQ(all[3].tunnel, 5U);
+  EXPECT_EQ(all[4].tunnel, 6U);
+}
+
 TEST(NetworkTrainer, ADenseNetworkLearnsWhatTheWallsTell) {
   neural::NetworkFile network = makeNetwork(smallDesign(true), "made up");
   EXPECT_LT(lastRms(network, quickTraining()), 0.02);  // of labels with 0.115 rad RMS
@@ -242,6 +266,30 @@ TEST(Recipe, ASmallOneIsFollowedToTheSameNetworkWithAnyNumberOfThreads) {
   EXPECT_EQ(one.network.parameters(), two.network.parameters());
   ASSERT_TRUE(one.domain.has_value());
   EXPECT_NE(one.training.find("small_recipe"), std::string::npos);
+}
+
+TEST(Recipe, OfRecordedTunnelsEveryFifthIsHeldOutWhateverTheirNumbers) {
+  Recipe recipe = loadRecipe(kSource + "/test/learning/small_recipe.yaml");
+  recipe.training.epochs = 1;
+  DataSet recorded = madeUp(600, 1);
+  for (std::size_t i = 0; i < recorded.size(); ++i) {
+    recorded[i].tunnel = static_cast<std::uint32_t>(7 + 5 * (i % 6));
+  }
+  std::string first;
+  follow(recipe, &recorded, 1, [&](const std::string& line) { first = first.empty() ? line : first; });
+  EXPECT_EQ(first, "400 examples, 200 more held out");
+}
+
+TEST(Recipe, RecordedDrivesOfOneTunnelAreRefusedWithAdvice) {
+  const Recipe recipe = loadRecipe(kSource + "/test/learning/small_recipe.yaml");
+  DataSet recorded = madeUp(240, 1);
+  for (Example& example : recorded) example.tunnel = 3;
+  try {
+    follow(recipe, &recorded, 1, [](const std::string&) {});
+    FAIL() << "nothing is held out";
+  } catch (const config::ConfigError& error) {
+    EXPECT_NE(std::string(error.what()).find("--tunnel-length"), std::string::npos) << error.what();
+  }
 }
 
 TEST(Recipe, AConvolutionBeginsFromRandomWeightsAndLearns) {

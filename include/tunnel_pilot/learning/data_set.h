@@ -29,4 +29,7 @@ inline drivers::TruckInputs truckInputsOf(const Example& example) {
 
 using DataSet = std::vector<Example>;
 
+/// Adds the examples of another set, whose tunnels are other ones and get numbers of their own.
+void append(DataSet& to, DataSet other);
+
 }  // namespace tunnel_pilot::learning

@@ -13,7 +13,8 @@ namespace tunnel_pilot::learning {
 /// beams say nearly the same, which makes a first layer on raw ranges slow to train. A dense first layer
 /// trained on the components is turned into the same layer on the raw inputs afterwards:
 ///   W_raw = W B,  b_raw = b - W B mean,  with z = B (x - mean).
-/// Single inputs (articulation, speed) are only centred and scaled.
+/// Single inputs (articulation, speed) are only centred and scaled; one that is the same in all examples
+/// gets no weight.
 class InputProjection {
  public:
   /// `inputs`: one column an example, the first `beams` rows its scan. Keeps `components` components.
