@@ -57,8 +57,9 @@ Proposal NeuralPreviewDriver::propose(const perception::Tunnel& tunnel, const Mo
 
   const double elapsed = predictor_.elapsed(now);
   const double speed = std::max(motion.speed, parameters_.planning_speed);
-  const double slower = kNetworkSpeed / speed;
-  const double wanted = slower * slower * network_.run(inputsAt(*start, tunnel.centerline, speed));
+  const double pace = std::max(speed, parameters_.network_law.least_pace);
+  const double slower = kNetworkSpeed / pace;
+  const double wanted = slower * slower * network_.run(inputsAt(*start, tunnel.centerline, pace));
   network_.learn(-start->offset, elapsed / parameters_.preview_time);
   const double corrected = start->articulation + parameters_.network_law.correction_time *
                                                      turnTowards(wanted, start->articulation, speed);
@@ -72,7 +73,7 @@ Proposal NeuralPreviewDriver::propose(const perception::Tunnel& tunnel, const Mo
   proposal.speed = parameters_.speed;
   proposal.confidence = confidence(tunnel.state);
   const geometry::PathPoint ahead =
-      tunnel.centerline.at(predictor_.footPoint() + speed * parameters_.preview_time);
+      tunnel.centerline.at(predictor_.footPoint() + pace * parameters_.preview_time);
   proposal.preview_point = geometry::Point(ahead.x, ahead.y);
   return proposal;
 }

@@ -19,6 +19,7 @@ NetworkLawParameters loadNetworkLaw(config::Node node, const std::string& folder
   NetworkLawParameters law{};
   law.file = (std::filesystem::path(folder) / node.text("file")).lexically_normal().string();
   law.correction_time = node.number("correction_time", "s", 0.0, 2.0);
+  law.least_pace = node.number("least_pace", "m/s", 0.1, 10.0);
   law.adaptation = loadAdaptation(node.child("adaptation"));
   node.finish();
   return law;

@@ -137,6 +137,20 @@ TEST(NeuralPreviewDriver, SteersRightFromTheLeftOfThePathAndTheOtherWayRound) {
   EXPECT_GT(settled(right, -0.3, 0.0, 0.0), 0.02);
 }
 
+TEST(NeuralPreviewDriver, ASlowTruckIsSteeredAsAtTheLeastPace) {
+  const auto asked = [](double least_pace) {
+    PreviewDriverParameters p = parameters();
+    p.network_law.least_pace = least_pace;
+    NeuralPreviewDriver d(p, truck().geometry);
+    const Proposal proposal = d.propose(tunnelAt(1.0, 0.3), motionAt(1.0), fromSeconds(1.0));
+    return std::make_pair(proposal.preview_point->x(), settled(d, 0.3, 0.0, 0.0));
+  };
+  const auto [far, calm] = asked(4.0);  // the truck drives 3 m/s
+  const auto [near, hasty] = asked(2.0);
+  EXPECT_NEAR(far - near, parameters().preview_time * (4.0 - 3.0), 0.01);
+  EXPECT_LT(std::abs(calm), 0.9 * std::abs(hasty));
+}
+
 TEST(NeuralPreviewDriver, StartsFromTheMeasuredArticulation) {
   const Proposal proposal = driver().propose(tunnelAt(1.0), motionAt(1.03, 0.2), fromSeconds(1.05));
   EXPECT_NEAR(proposal.articulation_angle, 0.2, 1e-9);

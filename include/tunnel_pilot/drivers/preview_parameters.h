@@ -20,6 +20,7 @@ enum class PreviewLaw { kOptimal, kNetwork };
 struct NetworkLawParameters {
   std::string file;        ///< with the law by the plan, it is not read
   double correction_time;  ///< T_c, which makes up for the steering's lag [s]
+  double least_pace;       ///< a slower truck is steered as at this one [m/s]
   AdaptationParameters adaptation;
 };
 
