@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kQuantile = 0.999;
 constexpr double kShare =
-    0.5;  // of the quantile: so the fall beyond the limit begins within what is rare
+    0.6;  // of the quantile: so the fall beyond the limit begins within what is rare
 // Added to each feature's variance: no scan is foreign for a few per cent that no training scan had.
 constexpr double kDeviation = 0.03;
 constexpr double kLeastInverse = 1e-6;  // [1/m]

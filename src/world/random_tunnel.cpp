@@ -46,7 +46,7 @@ LayoutRanges readRanges(Node& node) {
   Node bays = node.child("bays");
   r.bay_probability = bays.number("probability", "1", 0.0, 1.0);
   r.bay_width = readRange(bays, "width", "m", 0.5, 20.0);
-  r.bay_depth = readRange(bays, "depth", "m", 0.1, 20.0);
+  r.bay_depth = readRange(bays, "depth", "m", 0.1, 40.0);
   bays.finish();
   return r;
 }

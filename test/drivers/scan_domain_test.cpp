@@ -52,12 +52,12 @@ TEST(ScanDomain, TheDistanceOfGaussianExamplesIsTheirDimensionInTheMean) {
   EXPECT_NEAR(mean, 19.0, 0.5);
 }
 
-TEST(ScanDomain, OneInAThousandOfTheExamplesLiesBeyondTwiceTheLimit) {
+TEST(ScanDomain, OneInAThousandOfTheExamplesLiesBeyondTheLimitOverItsShare) {
   const auto examples = gaussianExamples(20000);
   const neural::InputDomain fitted = ScanDomain::fit(examples);
   const ScanDomain domain(fitted, "test");
   const auto beyond = std::count_if(examples.begin(), examples.end(), [&](const Features& example) {
-    return domain.distance(example) > 2.0 * fitted.limit;
+    return domain.distance(example) > fitted.limit / 0.6;
   });
   EXPECT_NEAR(static_cast<double>(beyond), 20.0, 2.0);
 }

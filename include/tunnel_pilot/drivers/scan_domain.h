@@ -24,7 +24,7 @@ class ScanDomain {
   /// Of 1/r of all beams [1/m], as invertRanges gives them; at least kSectors positive numbers.
   static Features features(const std::vector<float>& inverse);
 
-  /// Mean, covariance and limit of examples: the limit is half of the d^2 within which the share 0.999
+  /// Mean, covariance and limit of examples: the limit is 0.6 of the d^2 within which the share 0.999
   /// of them lies. Throws std::invalid_argument for less than 10 kSectors examples or numbers that are
   /// not finite.
   static neural::InputDomain fit(const std::vector<Features>& examples);
