@@ -1,5 +1,7 @@
 #include "tunnel_pilot/bridge/bridge_parameters.h"
 
+#include <cctype>
+
 namespace tunnel_pilot::bridge {
 namespace {
 
@@ -13,6 +15,16 @@ TrackingParameters loadTracking(config::Node node) {
   p.max_time = node.number("max_time", "s", 0.02, 2.0);
   node.finish();
   return p;
+}
+
+std::vector<std::string> loadHeartbeats(config::Node& node) {
+  std::vector<std::string> names = node.texts("heartbeats", 0, 32);
+  for (const std::string& name : names) {
+    if (std::isalpha(static_cast<unsigned char>(name[0])) == 0 && name[0] != '/') {
+      node.refuse("heartbeats", "holds '" + name + "', which is no name of a node");
+    }
+  }
+  return names;
 }
 
 }  // namespace
@@ -39,6 +51,8 @@ BridgeParameters loadBridge(config::Node node) {
   p.steering_rate = node.number("steering_rate", "rad/s", 0.01, 0.5);
   p.max_lateral_acceleration = node.number("max_lateral_acceleration", "m/s^2", 0.1, 2.0);
   p.gyro_bias_time = node.number("gyro_bias_time", "s", 0.1, 60.0);
+  p.heartbeat_timeout = node.number("heartbeat_timeout", "s", 0.04, 1.0);
+  p.heartbeats = loadHeartbeats(node);
   p.tracking = loadTracking(node.child("tracking"));
   p.slip.compliance = node.number("slip_compliance", "rad s^2/m", 0.0, 0.1);
   p.slip.yaw = drivers::loadYawObserver(node.child("yaw_response"));

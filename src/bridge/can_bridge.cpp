@@ -122,8 +122,12 @@ void CanBridge::setCommand(const Command& command, Stamp now) {
 
 std::optional<std::string> CanBridge::whyUnhealthy(Stamp now) const {
   const std::optional<Event> fault = anyFault(now);
-  const std::string trouble = fault == Event::kBusFault ? bus_.trouble() : "";
-  if (fault) return toString(*fault) + (trouble.empty() ? "" : ": " + trouble);
+  if (fault) {
+    const std::string detail = fault == Event::kBusFault        ? bus_.trouble()
+                               : fault == Event::kProcessSilent ? *silent_process_
+                                                                : "";
+    return toString(*fault) + (detail.empty() ? "" : ": " + detail);
+  }
   if (!lasts(healthy_since_, parameters_.health_time, now)) return "inputs not healthy for long enough";
   return std::nullopt;
 }
@@ -230,6 +234,7 @@ std::optional<Event> CanBridge::drivingFault(Stamp now) const {
 std::optional<Event> CanBridge::anyFault(Stamp now) const {
   if (const auto fault = linkFault(now)) return fault;
   if (const auto fault = truckFault()) return fault;
+  if (silent_process_) return Event::kProcessSilent;
   return commandFault(now);
 }
 
@@ -310,7 +315,8 @@ void CanBridge::watchInputs(Stamp now) {
   follow(link_healthy_since_, !link, now);
   follow(healthy_since_, !any, now);
   if (any) raise(*any, now);
-  // A fault of the truck may hide one of the command; each alone must stop.
+  // A fault of the truck may hide the others; each alone must stop.
+  if (silent_process_) raise(Event::kProcessSilent, now);
   if (const auto fault = commandFault(now)) raise(*fault, now);
   if (drives(status_.state)) {
     if (const auto fault = drivingFault(now)) raise(*fault, now);

@@ -31,14 +31,13 @@ std::string toString(SafetyState state) {
 
 std::string toString(Event event) {
   static const std::array<const char*, kEventCount> names = {
-      "link healthy",     "engage",         "command ready",
-      "arming timed out", "degrade asked",  "measurement late",
-      "recovered",        "bus fault",      "foreign sender",
-      "feedback corrupt", "feedback stale", "operator override",
-      "key turned",       "truck fault",    "truck refuses",
-      "tracking error",   "command stale",  "measurement stale",
-      "command stop",     "operator stop",  "operator release",
-      "clock jump",       "standstill",     "operator reset"};
+      "link healthy",   "engage",           "command ready",     "arming timed out",
+      "degrade asked",  "measurement late", "recovered",         "bus fault",
+      "foreign sender", "feedback corrupt", "feedback stale",    "operator override",
+      "key turned",     "truck fault",      "truck refuses",     "tracking error",
+      "process silent", "command stale",    "measurement stale", "command stop",
+      "operator stop",  "operator release", "clock jump",        "standstill",
+      "operator reset"};
   const auto index = static_cast<std::size_t>(event);
   return index < names.size() ? names[index] : "unknown event";
 }
@@ -68,6 +67,7 @@ const std::vector<Transition>& transitionTable() {
       {driving, E::kTruckFault, S::kStopping, Reason::kTruckFault},
       {driving, E::kTruckRefuses, S::kStopping, Reason::kTruckFault},
       {driving, E::kTrackingError, S::kStopping, Reason::kTrackingError},
+      {driving, E::kProcessSilent, S::kStopping, Reason::kProcessSilent},
       {driving, E::kCommandStale, S::kStopping, Reason::kCommandStale},
       {driving, E::kMeasurementStale, S::kStopping, Reason::kSourceStale},
       {driving, E::kCommandStop, S::kStopping, std::nullopt},
@@ -81,6 +81,7 @@ const std::vector<Transition>& transitionTable() {
       {armed, E::kOperatorOverride, S::kStandby, Reason::kOperatorOverride},
       {armed, E::kKeyTurned, S::kStandby, Reason::kOperatorRelease},
       {armed, E::kTruckFault, S::kStandby, Reason::kTruckFault},
+      {armed, E::kProcessSilent, S::kStandby, Reason::kProcessSilent},
       {armed, E::kCommandStale, S::kStandby, Reason::kCommandStale},
       {armed, E::kMeasurementStale, S::kStandby, Reason::kSourceStale},
       {armed, E::kOperatorRelease, S::kStandby, Reason::kOperatorRelease},

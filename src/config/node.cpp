@@ -159,6 +159,21 @@ std::vector<double> Node::numbers(const std::string& key, const std::string& uni
   return values;
 }
 
+std::vector<std::string> Node::texts(const std::string& key, std::size_t min_size,
+                                     std::size_t max_size) {
+  const YAML::Node list = take(key);
+  record(key, "", "texts", list);
+  const std::string wanted =
+      "must be a list of " + std::to_string(min_size) + " to " + std::to_string(max_size) + " texts";
+  if (!list.IsSequence() || list.size() < min_size || list.size() > max_size) refuse(key, wanted);
+  std::vector<std::string> values;
+  for (const YAML::Node& value : list) {
+    if (!value.IsScalar() || value.Scalar().empty()) refuse(key, wanted);
+    values.push_back(value.Scalar());
+  }
+  return values;
+}
+
 Node Node::child(const std::string& key) { return Node(take(key), *this, name(key)); }
 
 std::vector<Node> Node::children(const std::string& key) {

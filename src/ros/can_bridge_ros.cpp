@@ -2,6 +2,8 @@
 
 #include <ros/console.h>
 
+#include <map>
+
 #include "tunnel_pilot/ros/bus_choice.h"
 #include "tunnel_pilot/ros/conversions.h"
 #include "tunnel_pilot/ros/parameters.h"
@@ -12,24 +14,33 @@ namespace {
 constexpr double kTickPeriod = 0.005;  // [s] steady time
 constexpr Stamp kStatusPeriod = std::chrono::milliseconds(100);
 
+Stamp steadyNow() { return std::chrono::steady_clock::now().time_since_epoch(); }
+
 }  // namespace
 
 CanBridgeRos::CanBridgeRos(ros::NodeHandle nh, ros::NodeHandle private_nh) {
   Parameters parameters(private_nh);
   const auto truck = takeTruck(parameters);
+  publishers_ = PublisherWatch(takePublisher(parameters, nh));
+  if (const auto path = takeOptional(parameters, "operator_socket")) {
+    operator_socket_ = std::make_unique<bridge::OperatorSocket>(*path);
+  }
   bus_ = takeBus(parameters, ros::Time::isSimTime());
   const auto bridge_parameters = bridge::loadBridge(parameters.rest());
   bridge_ = std::make_unique<bridge::CanBridge>(bridge_parameters, truck.geometry, *bus_);
+  watchNodes(nh, bridge_parameters);
 
   joint_publisher_ = nh.advertise<sensor_msgs::JointState>("joint_states", 5);
   odometry_publisher_ = nh.advertise<nav_msgs::Odometry>("odom", 5);
   status_publisher_ = nh.advertise<TruckStatus>("truck_status", 5);
   diagnostics_ = std::make_unique<Diagnostics>(nh, private_nh, "can_bridge",
                                                [this](auto& status) { fillStatus(status); });
-  advertiseEdge(nh, "engage", &bridge::CanBridge::engage);
   advertiseEdge(nh, "release", &bridge::CanBridge::release);
   advertiseEdge(nh, "stop", &bridge::CanBridge::stop);
-  advertiseEdge(nh, "reset", &bridge::CanBridge::reset);
+  if (!operator_socket_) {  // otherwise what leads to driving is done there alone
+    advertiseEdge(nh, "engage", &bridge::CanBridge::engage);
+    advertiseEdge(nh, "reset", &bridge::CanBridge::reset);
+  }
   const auto hints = ros::TransportHints().tcpNoDelay();
   command_subscriber_ = nh.subscribe("command", 1, &CanBridgeRos::onCommand, this, hints);
   if (ros::Time::isSimTime()) {
@@ -44,26 +55,67 @@ CanBridgeRos::CanBridgeRos(ros::NodeHandle nh, ros::NodeHandle private_nh) {
 
 void CanBridgeRos::advertiseEdge(ros::NodeHandle& nh, const std::string& name, Edge edge) {
   const auto serve = [this, name, edge](Trigger::Request&, Trigger::Response& response) {
-    const auto answer = (bridge_.get()->*edge)(current());
+    const auto answer = serveEdge(name, edge);
     response.success = answer.accepted;
     response.message = answer.reason;
-    ROS_INFO("can_bridge: %s %s %s", name.c_str(),
-             answer.accepted ? "accepted" : "refused:", answer.reason.c_str());
     return true;
   };
   services_.push_back(nh.advertiseService<Trigger::Request, Trigger::Response>(
       name, boost::function<bool(Trigger::Request&, Trigger::Response&)>(serve)));
 }
 
+bridge::CanBridge::Answer CanBridgeRos::serveEdge(const std::string& name, Edge edge) {
+  auto answer = (bridge_.get()->*edge)(current());
+  ROS_INFO("can_bridge: %s %s %s", name.c_str(),
+           answer.accepted ? "accepted" : "refused:", answer.reason.c_str());
+  return answer;
+}
+
+void CanBridgeRos::hearOperator() {
+  if (!operator_socket_) return;
+  using Local = bridge::OperatorSocket::Edge;
+  static const std::map<Local, Edge> edges = {{Local::kEngage, &bridge::CanBridge::engage},
+                                              {Local::kRelease, &bridge::CanBridge::release},
+                                              {Local::kStop, &bridge::CanBridge::stop},
+                                              {Local::kReset, &bridge::CanBridge::reset}};
+  operator_socket_->poll(steadyNow(), [this](Local edge, unsigned user) {
+    const auto answer = serveEdge(toString(edge) + " by user " + std::to_string(user), edges.at(edge));
+    return answer.accepted ? std::string() : answer.reason;
+  });
+}
+
 void CanBridgeRos::onCommand(const CommandEvent& event) {
   const TruckCommand& message = *event.getConstMessage();
-  if (!publishers_.alone(event.getPublisherName(), ros::SteadyTime::now())) {
-    ROS_ERROR_THROTTLE(1.0, "can_bridge: command rejected: more than one node publishes it, %s is one",
-                       event.getPublisherName().c_str());
-    bridge_->rejectCommand(toCore(message), "more than one node publishes it", current());
+  const std::string why = publishers_.whyRefused(event.getPublisherName(), ros::SteadyTime::now());
+  if (!why.empty()) {
+    ROS_ERROR_THROTTLE(1.0, "can_bridge: command rejected: %s", why.c_str());
+    bridge_->rejectCommand(toCore(message), why, current());
     return;
   }
   bridge_->setCommand(toCore(message), current());
+}
+
+void CanBridgeRos::watchNodes(ros::NodeHandle& nh, const bridge::BridgeParameters& parameters) {
+  std::vector<std::string> nodes;
+  for (const std::string& node : parameters.heartbeats) nodes.push_back(nh.resolveName(node));
+  heartbeats_ = std::make_unique<bridge::HeartbeatWatch>(nodes, parameters.heartbeat_timeout);
+  if (nodes.empty()) return;
+  heartbeat_subscriber_ = nh.subscribe<Heartbeat>(
+      "heartbeat", 100,
+      [this](const Heartbeat::ConstPtr& m) { heartbeats_->heard(m->node, steadyNow()); },
+      ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay());
+}
+
+void CanBridgeRos::watchProcesses() {
+  const std::optional<std::string> silent = heartbeats_->silent(steadyNow());
+  bridge_->setSilentProcess(silent);
+  if (silent == silent_) return;
+  silent_ = silent;
+  if (silent) {
+    ROS_ERROR("can_bridge: %s is silent", silent->c_str());
+  } else {
+    ROS_INFO("can_bridge: all processes give signs of life");
+  }
 }
 
 Stamp CanBridgeRos::current() const { return ros::Time::isSimTime() ? last_tick_ : now(); }
@@ -75,7 +127,9 @@ void CanBridgeRos::tick(Stamp now) {
     published_status_ = Stamp{};
   }
   last_tick_ = now;
+  watchProcesses();
   bridge_->tick(now);
+  hearOperator();
   if (bridge_->motion().stamp != published_motion_) {
     publishMotion();
     publishStatus(now);
@@ -141,6 +195,7 @@ void CanBridgeRos::fillStatus(Diagnostics::Status& status) const {
   status.add("frames confirmed", bus_->confirmed());
   status.add("frames in flight", bus_->inFlight());
   status.add("trouble with the bus", bus_->trouble());
+  status.add("silent process", silent_.value_or(""));
   status.add("commands rejected", s.commands_rejected);
   status.add("last command rejection", s.command_rejection);
 }

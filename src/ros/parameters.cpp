@@ -77,6 +77,19 @@ config::Node Parameters::take(const std::set<std::string>& keys) {
 
 config::Node Parameters::rest() const { return config::Node(yaml_, source_); }
 
+std::optional<std::string> takeOptional(Parameters& parameters, const std::string& key) {
+  config::Node node = parameters.take({key});
+  if (!node.has(key)) return std::nullopt;
+  const std::string text = node.text(key);
+  if (text.empty()) node.refuse(key, "is empty: leave it out instead");
+  return text;
+}
+
+std::string takePublisher(Parameters& parameters, const ros::NodeHandle& nh) {
+  const std::optional<std::string> name = takeOptional(parameters, "publisher");
+  return name ? nh.resolveName(*name) : "";
+}
+
 vehicle::TruckParameters takeTruck(Parameters& parameters) {
   config::Node node = parameters.take({"truck_file"});
   return vehicle::loadTruck(node.text("truck_file"));

@@ -12,7 +12,12 @@ namespace tunnel_pilot::shell {
 using perception::ScanFilter;
 
 ScanFilterRos::ScanFilterRos(ros::NodeHandle nh, ros::NodeHandle private_nh)
-    : filter_(perception::loadScanFilter(Parameters(private_nh).rest())),
+    : ScanFilterRos(nh, private_nh, Parameters(private_nh)) {}
+
+ScanFilterRos::ScanFilterRos(ros::NodeHandle nh, const ros::NodeHandle& private_nh,
+                             Parameters parameters)
+    : publishers_(takePublisher(parameters, nh)),
+      filter_(perception::loadScanFilter(parameters.rest())),
       scan_publisher_(nh.advertise<sensor_msgs::LaserScan>("scan_filtered", 1)),
       points_publisher_(nh.advertise<sensor_msgs::PointCloud2>("points", 1)),
       scan_subscriber_(
@@ -26,11 +31,11 @@ void ScanFilterRos::onScan(const ScanEvent& event) {
     ROS_WARN("scan_filter: the clock jumped, starting anew");
     filter_.reset();
   }
-  if (!publishers_.alone(event.getPublisherName(), ros::SteadyTime::now())) {
+  const std::string why = publishers_.whyRefused(event.getPublisherName(), ros::SteadyTime::now());
+  if (!why.empty()) {
     ++foreign_;
-    problem_ = "scan rejected: more than one node publishes it";
-    ROS_ERROR_THROTTLE(1.0, "scan_filter: %s: %s is one", problem_.c_str(),
-                       event.getPublisherName().c_str());
+    problem_ = "scan rejected: " + why;
+    ROS_ERROR_THROTTLE(1.0, "scan_filter: %s", problem_.c_str());
     return;
   }
   const auto sensor = sensor_pose_.find(message.header.frame_id);
@@ -65,7 +70,7 @@ void ScanFilterRos::fillStatus(Diagnostics::Status& status) const {
   }
   status.add("accepted", filter_.accepted());
   status.add("rejected", filter_.rejected() + foreign_);
-  if (foreign_ > 0) status.add("from more than one node", foreign_);
+  if (foreign_ > 0) status.add("from the wrong nodes", foreign_);
   for (std::size_t i = 1; i < ScanFilter::kRejections; ++i) {
     const auto rejection = static_cast<ScanFilter::Rejection>(i);
     if (filter_.count(rejection) > 0) status.add(toString(rejection), filter_.count(rejection));

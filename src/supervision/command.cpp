@@ -94,6 +94,8 @@ std::string toString(Reason reason) {
       return "implausible speed";
     case Reason::kLowConfidence:
       return "low confidence of the driver";
+    case Reason::kProcessSilent:
+      return "a process of the pilot is silent";
     case Reason::kDriversDisagree:
       return "the drivers disagree";
   }

@@ -8,6 +8,7 @@
 
 #include "tunnel_pilot/bridge/bridge_parameters.h"
 #include "tunnel_pilot/bridge/command_sender.h"
+#include "tunnel_pilot/bridge/heartbeat_watch.h"
 #include "tunnel_pilot/bridge/odometry.h"
 #include "tunnel_pilot/bridge/steering_watch.h"
 #include "tunnel_pilot/bridge/truck_link.h"
@@ -56,10 +57,44 @@ TEST(BridgeParameters, EveryKeyIsNeededAndOfTheRightKind) {
     }
     ++keys;
   }
-  EXPECT_EQ(keys, 24);
+  EXPECT_EQ(keys, 26);
   YAML::Node unknown = YAML::Clone(good);
   unknown["typo"] = 1;
   EXPECT_TRUE(refused(unknown, "typo"));
+}
+
+// -------- heartbeats
+
+TEST(HeartbeatWatch, WhoWasNeverHeardIsSilent) {
+  HeartbeatWatch watch({"/arbiter", "/centerline"}, 0.06);
+  watch.heard("/centerline", ms(0));
+  EXPECT_EQ(watch.silent(ms(1)), "/arbiter");
+}
+
+TEST(HeartbeatWatch, WhoIsHeardInTimeLives) {
+  HeartbeatWatch watch({"/arbiter", "/centerline"}, 0.06);
+  for (int t = 0; t < 2000; t += 60) {
+    watch.heard("/arbiter", ms(t));
+    watch.heard("/centerline", ms(t));
+    EXPECT_FALSE(watch.silent(ms(t + 60)));
+  }
+}
+
+TEST(HeartbeatWatch, WhoFallsSilentIsNamedAfterTheTimeoutAndLivesWhenHeardAgain) {
+  HeartbeatWatch watch({"/arbiter", "/centerline"}, 0.06);
+  watch.heard("/arbiter", ms(0));
+  watch.heard("/centerline", ms(40));
+  EXPECT_FALSE(watch.silent(ms(60)));
+  EXPECT_EQ(watch.silent(ms(61)), "/arbiter");
+  watch.heard("/arbiter", ms(70));
+  EXPECT_FALSE(watch.silent(ms(100)));
+}
+
+TEST(HeartbeatWatch, OthersDoNotCount) {
+  HeartbeatWatch watch({"/arbiter"}, 0.06);
+  watch.heard("/stranger", ms(0));
+  EXPECT_EQ(watch.silent(ms(1)), "/arbiter");
+  EXPECT_FALSE(HeartbeatWatch({}, 0.06).silent(ms(1)));
 }
 
 // -------- odometry

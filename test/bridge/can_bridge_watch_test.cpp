@@ -71,6 +71,37 @@ TEST_P(Watchdog, CommandStale) {
   expectStop(Reason::kCommandStale, 0.079, 0.101);
 }
 
+TEST_P(Watchdog, SilentProcess) {
+  rig.drive();
+  rig.bridge->setSilentProcess("/centerline");
+  expectStop(Reason::kProcessSilent, -0.001, 0.0);
+}
+
+TEST_P(Watchdog, WithASilentProcessNobodyEngages) {
+  rig.run(1.5);
+  ASSERT_EQ(rig.state(), SafetyState::kStandby);
+  rig.bridge->setSilentProcess("/centerline");
+  rig.run(0.05);
+  const CanBridge::Answer answer = rig.bridge->engage(rig.now);
+  EXPECT_FALSE(answer.accepted);
+  EXPECT_EQ(answer.reason, "process silent: /centerline");
+  rig.bridge->setSilentProcess(std::nullopt);
+  rig.run(0.5);
+  EXPECT_FALSE(rig.bridge->engage(rig.now).accepted) << "not healthy for long enough";
+  rig.run(0.6);
+  EXPECT_TRUE(rig.bridge->engage(rig.now).accepted);
+}
+
+TEST_P(Watchdog, ASilentProcessEndsArming) {
+  rig.run(1.5);
+  rig.arbiter_alive = true;
+  ASSERT_TRUE(rig.bridge->engage(rig.now).accepted);
+  rig.bridge->setSilentProcess("/centerline");
+  rig.run(0.03);
+  EXPECT_EQ(rig.state(), SafetyState::kStandby);
+  EXPECT_EQ(rig.reason(), Reason::kProcessSilent);
+}
+
 TEST_P(Watchdog, MeasurementStale) {
   rig.drive();
   rig.measurement = rig.now;  // from here on the commands stem from one old scan
@@ -240,6 +271,8 @@ std::vector<LatencyRow> latencyRows() {
       {"C3 all frames lost", 0.060, From::kLastFeedback, [](Rig& rig) { rig.truck_alive = false; }},
       {"C3 TRUCK_FEEDBACK lost", 0.060, From::kLastFeedback, mute_feedback},
       {"A1 commands lost", 0.100, From::kLastCommand, [](Rig& rig) { rig.arbiter_alive = false; }},
+      {"D1 process silent", 0.0, From::kFault,
+       [](Rig& rig) { rig.bridge->setSilentProcess("/centerline"); }},
       {"A2 operator's stop", 0.0, From::kFault, [](Rig& rig) { rig.bridge->stop(rig.now), rig.pump(); }},
       {"A2 arbiter's stop", 0.020, From::kFault, [](Rig& rig) { rig.command.stop = true; }},
       {"A4 operator's wheel", 0.020, From::kFault, [](Rig& rig) { rig.cab.steering_wheel = 0.2; }},

@@ -80,6 +80,17 @@ TEST(ConfigNode, ListsOfWrongSizeAreRefused) {
   EXPECT_THROW(node.numbers("a", "m", 0, 5, 2, 2), ConfigError);
 }
 
+TEST(ConfigNode, ListsOfTextAreReadAndOthersRefused) {
+  Node node(YAML::Load("{names: [a, /b], empty: [], text: a, maps: [{a: 1}], blank: ['']}"), "x");
+  EXPECT_EQ(node.texts("names", 0, 2), (std::vector<std::string>{"a", "/b"}));
+  EXPECT_TRUE(node.texts("empty", 0, 2).empty());
+  for (const char* wrong : {"text", "maps", "blank"}) {
+    EXPECT_THROW(node.texts(wrong, 0, 2), ConfigError) << wrong;
+  }
+  EXPECT_THROW(node.texts("names", 0, 1), ConfigError);
+  EXPECT_THROW(node.texts("empty", 1, 2), ConfigError);
+}
+
 TEST(ConfigNode, RecordsTellKeyUnitRangeAndValue) {
   Node node = parse("{steering: {dead_time: 0.15}, kind: a}");
   Node child = node.child("steering");

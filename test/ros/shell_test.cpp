@@ -227,12 +227,20 @@ nav_msgs::Odometry odometry(double stamp, double speed) {
 
 TEST(PublisherWatch, NoticesASecondNodeUntilItIsSilent) {
   PublisherWatch watch;
-  EXPECT_TRUE(watch.alone("/lidar", ros::SteadyTime(1.0)));
-  EXPECT_TRUE(watch.alone("/lidar", ros::SteadyTime(1.1)));
-  EXPECT_FALSE(watch.alone("/rogue", ros::SteadyTime(1.2)));
-  EXPECT_FALSE(watch.alone("/lidar", ros::SteadyTime(1.3)));
-  EXPECT_FALSE(watch.alone("/lidar", ros::SteadyTime(2.1)));
-  EXPECT_TRUE(watch.alone("/lidar", ros::SteadyTime(2.3)));
+  EXPECT_EQ(watch.whyRefused("/lidar", ros::SteadyTime(1.0)), "");
+  EXPECT_EQ(watch.whyRefused("/lidar", ros::SteadyTime(1.1)), "");
+  EXPECT_NE(watch.whyRefused("/rogue", ros::SteadyTime(1.2)), "");
+  EXPECT_NE(watch.whyRefused("/lidar", ros::SteadyTime(1.3)), "");
+  EXPECT_NE(watch.whyRefused("/lidar", ros::SteadyTime(2.1)), "");
+  EXPECT_EQ(watch.whyRefused("/lidar", ros::SteadyTime(2.3)), "");
+}
+
+TEST(PublisherWatch, RefusesAnotherNodeThanTheOneThatIsPinned) {
+  PublisherWatch watch("/lidar");
+  EXPECT_EQ(watch.whyRefused("/rogue", ros::SteadyTime(1.0)),
+            "/rogue publishes it, which only /lidar may");
+  EXPECT_NE(watch.whyRefused("/lidar", ros::SteadyTime(1.1)), "") << "the other still speaks";
+  EXPECT_EQ(watch.whyRefused("/lidar", ros::SteadyTime(2.2)), "");
 }
 
 TEST(MotionInput, SaysNothingUntilBothTopicsSpoke) {

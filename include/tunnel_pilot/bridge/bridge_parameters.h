@@ -1,5 +1,8 @@
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "tunnel_pilot/bridge/odometry.h"
 #include "tunnel_pilot/bridge/odometry_error.h"
 #include "tunnel_pilot/config/node.h"
@@ -38,6 +41,8 @@ struct BridgeParameters {
   double steering_rate;             ///< of the angle sent, the last limit before the bus [rad/s]
   double max_lateral_acceleration;  ///< of the angle sent, at the speed measured [m/s^2]
   double gyro_bias_time;            ///< time constant of the gyro's bias at standstill [s]
+  double heartbeat_timeout;         ///< of each process in `heartbeats` [s]
+  std::vector<std::string> heartbeats;  ///< processes (node names) that must give signs of life
   TrackingParameters tracking;
   SlipModel slip;       ///< for odometry
   SensorErrors errors;  ///< of what odometry is made from

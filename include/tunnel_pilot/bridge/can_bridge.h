@@ -3,6 +3,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "tunnel_pilot/bridge/bridge_parameters.h"
 #include "tunnel_pilot/bridge/command_sender.h"
@@ -70,6 +71,10 @@ class CanBridge {
 
   /// Refuses a command for a reason of the caller's, as setCommand() refuses one.
   void rejectCommand(const supervision::Command& command, const std::string& why, Stamp now);
+
+  /// Which of the pilot's processes gives no sign of life (HeartbeatWatch); none: all do. Asked of
+  /// before each tick.
+  void setSilentProcess(std::optional<std::string> process) { silent_process_ = std::move(process); }
 
   /// Drains the bus, watches, runs the table, integrates odometry, sends what is due. Call at 50 Hz or
   /// more. A `now` before the last one is a clock that jumped.
@@ -144,6 +149,7 @@ class CanBridge {
   BridgeStatus status_;
 
   std::optional<Received> command_;
+  std::optional<std::string> silent_process_;
   std::uint32_t sequence_offset_ = 0;  ///< added to the arbiter's numbers, so that they never decrease
   Stamp last_tick_{};
   Stamp entered_{};  ///< the present state

@@ -50,6 +50,7 @@ enum class Event : std::uint8_t {
   kTruckFault,
   kTruckRefuses,  ///< the truck's controller does not obey though it is asked to
   kTrackingError,
+  kProcessSilent,  ///< no heartbeat of one of the pilot's processes
   kCommandStale,
   kMeasurementStale,
   kCommandStop,  ///< the arbiter asks for a stop

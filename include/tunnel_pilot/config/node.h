@@ -46,6 +46,8 @@ class Node {
   /// List of numbers with min_size..max_size entries.
   std::vector<double> numbers(const std::string& key, const std::string& unit, double min, double max,
                               std::size_t min_size, std::size_t max_size);
+  /// List of texts with min_size..max_size entries.
+  std::vector<std::string> texts(const std::string& key, std::size_t min_size, std::size_t max_size);
   /// Nested map, and list of maps.
   Node child(const std::string& key);
   std::vector<Node> children(const std::string& key);

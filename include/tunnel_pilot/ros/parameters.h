@@ -4,6 +4,7 @@
 #include <xmlrpcpp/XmlRpcValue.h>
 #include <yaml-cpp/yaml.h>
 
+#include <optional>
 #include <set>
 #include <string>
 
@@ -36,6 +37,12 @@ class Parameters {
   std::string source_;
   YAML::Node yaml_;
 };
+
+/// The text parameter `key`, which may be absent.
+std::optional<std::string> takeOptional(Parameters& parameters, const std::string& key);
+
+/// The resolved name that the optional parameter `publisher` gives; empty without it.
+std::string takePublisher(Parameters& parameters, const ros::NodeHandle& nh);
 
 /// The truck whose YAML file the text parameter `truck_file` names. Throws config::ConfigError.
 vehicle::TruckParameters takeTruck(Parameters& parameters);

@@ -8,6 +8,7 @@
 #include "tunnel_pilot/perception/scan_filter.h"
 #include "tunnel_pilot/ros/clock_watch.h"
 #include "tunnel_pilot/ros/diagnostics.h"
+#include "tunnel_pilot/ros/parameters.h"
 #include "tunnel_pilot/ros/publisher_watch.h"
 #include "tunnel_pilot/ros/sensor_pose.h"
 
@@ -19,23 +20,26 @@ namespace tunnel_pilot::shell {
 /// with the scan's stamp; nothing for a rejected scan, which is logged, counted and told on
 /// /diagnostics. While more than one node publishes
 /// `scan`, every scan is rejected. Parameters:
-/// config/scan_filter.yaml. Throws config::ConfigError.
+/// config/scan_filter.yaml, and `publisher`, the only node that may publish `scan` (absent: any one
+/// node). Throws config::ConfigError.
 class ScanFilterRos {
  public:
   ScanFilterRos(ros::NodeHandle nh, ros::NodeHandle private_nh);
 
  private:
+  ScanFilterRos(ros::NodeHandle nh, const ros::NodeHandle& private_nh, Parameters parameters);
+
   using ScanEvent = ros::MessageEvent<const sensor_msgs::LaserScan>;
   void onScan(const ScanEvent& event);
   void publish(const perception::ScanFilter::Result& result, const sensor_msgs::LaserScan& source);
   void fillStatus(Diagnostics::Status& status) const;
 
+  PublisherWatch publishers_;
   perception::ScanFilter filter_;
   SensorPose sensor_pose_;
   ClockWatch clock_;
   std::string problem_ = "no scan yet";  // why the last scan was not used; empty when it was
-  PublisherWatch publishers_;
-  std::uint64_t foreign_ = 0;  // scans rejected because more than one node published
+  std::uint64_t foreign_ = 0;            // scans rejected for who published them
   ros::Publisher scan_publisher_;
   ros::Publisher points_publisher_;
   ros::Subscriber scan_subscriber_;

@@ -7,15 +7,19 @@
 #include <memory>
 #include <string>
 
+#include "tunnel_pilot/ros/heartbeat.h"
+
 namespace tunnel_pilot::shell {
 
-/// A stage as nodelet: its callbacks run one at a time (single-threaded queue of the manager). A stage
+/// A stage as nodelet: its callbacks run one at a time (single-threaded queue of the manager), its
+/// heartbeat among them. A stage
 /// that refuses its parameters is not loaded; the log says why.
 template <class Stage>
 class StageNodelet : public nodelet::Nodelet {
   void onInit() override {
     try {
       stage_ = std::make_unique<Stage>(getNodeHandle(), getPrivateNodeHandle());
+      heartbeat_ = std::make_unique<Heartbeat>(getNodeHandle(), getName());
     } catch (const std::exception& e) {
       NODELET_FATAL("%s", e.what());
       throw;
@@ -23,6 +27,7 @@ class StageNodelet : public nodelet::Nodelet {
   }
 
   std::unique_ptr<Stage> stage_;
+  std::unique_ptr<Heartbeat> heartbeat_;
 };
 
 /// A stage as a node of its own. Exit status 1 when it refuses its parameters; the log says why.
@@ -31,6 +36,7 @@ int runStage(int argc, char** argv, const std::string& name) {
   ros::init(argc, argv, name);
   try {
     Stage stage{ros::NodeHandle(), ros::NodeHandle("~")};
+    const Heartbeat heartbeat(ros::NodeHandle(), ros::this_node::getName());
     ros::spin();
   } catch (const std::exception& e) {
     ROS_FATAL("%s", e.what());

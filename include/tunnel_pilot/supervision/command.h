@@ -53,6 +53,7 @@ enum class Reason : std::uint8_t {
   kSpeedImplausible = 24,
   kLowConfidence = 25,    ///< a driver is less sure than its rule asks for
   kDriversDisagree = 26,  ///< two drivers ask for different articulations
+  kProcessSilent = 27,    ///< a process of the pilot gives no sign of life
 };
 
 std::string toString(Mode mode);
