@@ -261,6 +261,15 @@ TEST_F(J1939BusTest, AClockThatJumpsBackDoesNotProlongTheContention) {
   EXPECT_TRUE(sendsCommand());
 }
 
+TEST_F(J1939BusTest, AClockThatJumpsAheadDoesNotShortenTheContention) {
+  run(ms(100));
+  now += std::chrono::hours(1);
+  run(ms(5));
+  EXPECT_FALSE(sendsCommand());
+  run(ms(200));
+  EXPECT_TRUE(sendsCommand());
+}
+
 TEST_F(J1939BusTest, ANameOfEightBytesAloneContends) {
   hold();
   Frame odd = claimOf(0);
