@@ -56,7 +56,7 @@ TEST(BridgeParameters, EveryKeyIsNeededAndOfTheRightKind) {
     }
     ++keys;
   }
-  EXPECT_EQ(keys, 24);
+  EXPECT_EQ(keys, 26);
   YAML::Node unknown = YAML::Clone(good);
   unknown["typo"] = 1;
   EXPECT_TRUE(refused(unknown, "typo"));

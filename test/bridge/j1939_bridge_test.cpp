@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdio>
 
 #include "../can/fake_can_socket.h"
 #include "rig.h"
@@ -163,25 +162,16 @@ TEST_P(J1939Bridge, TheAddressLostWhileActiveStopsAndSilencesWithin250Millisecon
   EXPECT_LT(std::abs(rig.plant.state().speed), 0.05);
 }
 
-TEST_P(J1939Bridge, TheLastFrameComesBeforeTheTickAfterTheLossInAnyPhase) {
-  double worst = 0.0;
+TEST_P(J1939Bridge, NoFrameFollowsTheLossInAnyPhase) {
   for (int phase = 0; phase < 20; ++phase) {
     Rig other(GetParam(), can::ProfileKind::kJ1939);
     other.drive();
     other.run(1e-3 * phase);
-    const Stamp lost = other.now;
     other.wire_to_bridge->send(claimOf(ownName() - 1));
-    const std::size_t before = other.log.size();
-    std::size_t seen = before;
-    other.run(0.5, [&] {
-      for (; seen < other.log.size(); ++seen) {
-        if (isPilots(other.log[seen])) worst = std::max(worst, toSeconds(other.now - lost));
-      }
-      return false;
-    });
+    const auto before = static_cast<std::ptrdiff_t>(other.log.size());
+    other.run(0.5);
+    EXPECT_EQ(std::count_if(other.log.begin() + before, other.log.end(), isPilots), 0) << phase;
   }
-  std::printf("  tick %2.0f ms: silent after %.0f ms\n", 1e3 * GetParam(), 1e3 * worst);
-  EXPECT_LE(worst, GetParam());
 }
 
 TEST_P(J1939Bridge, TheAddressLostIsToldInWordsWhereTheResetIsRefused) {
@@ -221,6 +211,19 @@ TEST_P(J1939Bridge, AfterTheBusWasDownTheAddressIsClaimedBeforeFramesGoOn) {
   rig.run(0.1);
   EXPECT_GT(pilotFrames(), before);
   rig.judge = Judge();  // it counted on while the bus was down
+}
+
+TEST_P(J1939Bridge, AfterTheClaimTheAngleOfAStopBeginsAtTheMeasuredOne) {
+  rig.drive();
+  rig.command.articulation_angle = 0.5;
+  rig.run(0.6);  // turning
+  rig.bridge_side.setState(can::BusState::kDown);
+  rig.run(0.05);
+  rig.bridge_side.setState(can::BusState::kActive);
+  rig.judge = Judge();
+  rig.run(0.5, [&] { return !rig.judge.commands.empty(); });
+  ASSERT_TRUE(rig.judge.last->steering_enable);
+  EXPECT_NEAR(rig.judge.last->articulation_angle, rig.plant.state().articulation, 0.015);
 }
 
 // -------- on SocketCAN, with a kernel that fails

@@ -41,6 +41,9 @@ class Network:
         if self.loss_owed is not None:
             self.loss_owed = time if works else FAR
 
+    def may_speak_since(self):
+        return -FAR if self.claimed is None else self.claimed + CONTENTION
+
     def is_foreign(self, identifier):
         """A frame that nobody but the pilot may send, from an address that is not its, or that it does not send."""
         ours = identifier & 0xFF == self.address
