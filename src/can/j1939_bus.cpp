@@ -61,14 +61,18 @@ std::optional<Frame> J1939Bus::receive() {
 }
 
 Frame J1939Bus::handedUp(Frame frame) const {
+  const bool plain = !frame.extended;
+  frame.extended = true;
+  if (plain) return frame;
   const J1939Id id = fromIdentifier(frame.id);
-  const J1939Group* group = frame.extended ? findGroup(&J1939Group::pgn, id.pgn) : nullptr;
+  const J1939Group* group = findGroup(&J1939Group::pgn, id.pgn);
   const bool our_group = group != nullptr && group->sender == parameters_.side;
-  const bool our_address = frame.extended && id.source == parameters_.source_address;
+  const bool our_address = id.source == parameters_.source_address;
   const bool partners = group != nullptr && id.source == parameters_.partner_address;
   if (our_address && !our_group) group = findGroup(&J1939Group::sender, parameters_.side);
-  frame.extended = !our_group && !our_address && !partners;
-  if (!frame.extended) frame.id = group->id;
+  if (!our_group && !our_address && !partners) return frame;
+  frame.id = group->id;
+  frame.extended = false;
   return frame;
 }
 

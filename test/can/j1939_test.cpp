@@ -24,11 +24,13 @@ TEST(J1939Identifier, OfEveryGroupAddressAndPriorityComesBack) {
 }
 
 TEST(J1939Identifier, OfAGroupWithDestinationBringsItBack) {
-  for (unsigned destination = 0; destination < 256; ++destination) {
-    const auto to = static_cast<std::uint8_t>(destination);
-    const J1939Id back = fromIdentifier(toIdentifier({6, kRequestPgn, to, 0x80}));
-    ASSERT_EQ(back.destination, destination);
-    ASSERT_EQ(back.pgn, kRequestPgn);
+  for (const std::uint32_t pgn : {0x0u, kRequestPgn, kAddressClaimedPgn, 0xEF00u, 0x1EF00u}) {
+    for (unsigned destination = 0; destination < 256; ++destination) {
+      const auto to = static_cast<std::uint8_t>(destination);
+      const J1939Id back = fromIdentifier(toIdentifier({6, pgn, to, 0x80}));
+      ASSERT_EQ(back.destination, destination);
+      ASSERT_EQ(back.pgn, pgn);
+    }
   }
 }
 
