@@ -86,7 +86,7 @@ BusState J1939Bus::state() const {
 }
 
 std::string J1939Bus::trouble() const {
-  const std::string below = bus_->trouble();
+  std::string below = bus_->trouble();
   if (!below.empty()) return below;
   const std::string address = "J1939 address " + std::to_string(parameters_.source_address);
   if (const auto winner = claim_.lostTo()) {
