@@ -22,9 +22,9 @@ with open(options.latencies, encoding='utf-8') as file:
 j1939 = options.profile == 'j1939'
 profile = ' --profile j1939' if j1939 else ''
 title = 'Fault campaign on a J1939 network' if j1939 else 'Fault campaign'
-network = """ Requests for claims, and claims of the pilot's address under
-a higher NAME (answered) and a lower one (after which the pilot is silent until the next pair) come beside them, and frames
-of the truck's groups from another address.""" if j1939 else ''
+network = """
+Requests for claims, and claims of the pilot's address under a higher NAME (answered) and a lower one (after which the
+pilot is silent until the next pair) come beside them, and frames of the truck's groups from another address.""" if j1939 else ''
 foreign = report['foreign_frames']
 unsafe = report['unsafe_frames'] - foreign
 judged = 'all of them' if options.share == 1 else f'every {options.share}th minute of them'

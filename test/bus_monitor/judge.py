@@ -340,7 +340,7 @@ class Judge:
                 self._find(time, 'c', 'steers on old feedback', f'{stream.name} {told}', text)
         if self.taken_over is not None and time - self.taken_over > TAKE_OVER_LIMIT + self.jitter:
             self._find(time, 'c', 'steers against the operator', f'{(time - self.taken_over) / MS:g} ms', text)
-        could_speak = self.network.may_speak_since() if self.network else NEVER
+        could_speak = self.network.may_speak or NEVER if self.network else NEVER
         for word, told in (('source', self.source_time), ('state', self.state_time)):
             since = max(told, could_speak)
             if time - since > UNTOLD_LIMIT + self.jitter:

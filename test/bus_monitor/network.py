@@ -31,18 +31,16 @@ class Network:
         self.start()
 
     def start(self):
-        self.claimed = -FAR if self.joined_late else None  # since when
+        self.may_speak = -FAR if self.joined_late else None  # from when on; None: no claim yet
         self.lost = None  # since when
         self.loss_owed = None  # since when a cannot-claim is
+        self.causes = 0  # to send one, less those sent: one may answer several
         self.asked = None  # (since when, what) an answer is due
 
     def bus(self, time, works):
-        self.claimed = self.asked = None
+        self.may_speak = self.asked = None
         if self.loss_owed is not None:
             self.loss_owed = time if works else FAR
-
-    def may_speak_since(self):
-        return -FAR if self.claimed is None else self.claimed + CONTENTION
 
     def is_foreign(self, identifier):
         """A frame that nobody but the pilot may send, from an address that is not its, or that it does not send."""
@@ -68,7 +66,8 @@ class Network:
         if destination_of(identifier) in (GLOBAL_ADDRESS, self.address):
             if self.lost is not None:
                 self.loss_owed = time if self.loss_owed is None else self.loss_owed
-            elif self.claimed is not None:
+                self.causes += 1
+            elif self.may_speak is not None:
                 self.asked = self.asked or (time, 'request not answered')
         return True
 
@@ -76,20 +75,22 @@ class Network:
         if self.name is None:
             self.name = name
         if name == self.name:
-            if self.lost is not None:
+            if self.lost is not None and time - self.lost > SILENCE_LIMIT:
                 self.find(time, 'claims again', 'an address that was lost', text)
-            if self.claimed is None:
-                self.claimed = time
+            if self.may_speak is None or time < self.may_speak:
+                self.may_speak = time + CONTENTION
             self.asked = None
         elif self.lost is None and name < self.name:
             self.lost = self.loss_owed = time
+            self.causes = 1
             self.asked = None
-        elif self.lost is None and self.claimed is not None:
+        elif self.lost is None and self.may_speak is not None:
             self.asked = self.asked or (time, 'claim not defended')
 
     def _cannot_claim(self, time, text):
-        if self.loss_owed is None:
+        if self.causes == 0:
             self.find(time, 'loss told unasked', 'cannot claim', text)
+        self.causes = max(self.causes - 1, 0)
         self.loss_owed = None
 
     def pilot_frame(self, time, jitter, text):
@@ -97,10 +98,10 @@ class Network:
         if self.lost is not None:
             if time - self.lost > SILENCE_LIMIT + jitter:
                 self.find(time, 'address lost', f'{(time - self.lost) / MS:g} ms ago', text)
-        elif self.claimed is None:
+        elif self.may_speak is None:
             self.find(time, 'not claimed', 'no claim of the address before', text)
-        elif time - self.claimed < CONTENTION - jitter:
-            self.find(time, 'not claimed', f'{(time - self.claimed) / MS:g} ms after the claim', text)
+        elif time < self.may_speak - jitter:
+            self.find(time, 'not claimed', f'{(self.may_speak - time) / MS:g} ms too soon after the claim', text)
         if self.asked and time - self.asked[0] > ANSWER_LIMIT + jitter:
             self.find(time, self.asked[1], f'for {(time - self.asked[0]) / MS:g} ms', text)
             self.asked = None
