@@ -57,6 +57,7 @@ BridgeParameters loadBridge(config::Node node) {
   p.slip.compliance = node.number("slip_compliance", "rad s^2/m", 0.0, 0.1);
   p.slip.yaw = drivers::loadYawObserver(node.child("yaw_response"));
   p.errors = loadSensorErrors(node.child("sensor_errors"));
+  p.can = can::loadProfile(node, can::Side::kPilot);
   node.finish();
   return p;
 }

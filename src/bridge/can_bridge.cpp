@@ -401,7 +401,9 @@ void CanBridge::sendIfDue(Stamp now) {
   if (!sender_.send(command, info, composeStatus(now), bus_, now)) return;
   transmit_.sent(std::max(bus_.inFlight(), in_flight) - in_flight, now);
   sent_angle_ = command.articulation_angle;
-  steering_sent_ = command.steering_enable;
+  // After sets that the bus refused (it is down, or claims its address) the angle begins at the measured
+  // one.
+  steering_sent_ = command.steering_enable && !sender_.broken();
   sent_at_ = now;
 }
 

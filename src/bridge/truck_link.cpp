@@ -12,6 +12,7 @@ bool TruckLink::receive(can::Bus& bus, Stamp now) {
   last_call_ = now;
   new_feedback_ = false;
   foreign_sender_ = false;
+  bus.tick(now);
   for (int i = 0; i < kFramesPerTick; ++i) {
     const std::optional<can::Frame> frame = bus.receive();
     if (!frame) break;

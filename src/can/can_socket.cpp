@@ -170,7 +170,8 @@ int openNetlink(unsigned groups) {
 
 can_filter filterOf(const Identifier& identifier) {
   const canid_t flags = CAN_EFF_FLAG | CAN_RTR_FLAG;
-  if (identifier.extended) return {identifier.id | CAN_EFF_FLAG, CAN_EFF_MASK | flags};
+  if (identifier.extended)
+    return {identifier.id | CAN_EFF_FLAG, (identifier.mask & CAN_EFF_MASK) | flags};
   return {identifier.id, CAN_SFF_MASK | flags};
 }
 
@@ -347,6 +348,11 @@ class LinuxCanSocket : public CanSocket {
 };
 
 }  // namespace
+
+bool matches(const Identifier& identifier, const Frame& frame) {
+  const std::uint32_t mask = identifier.extended ? identifier.mask : CAN_SFF_MASK;
+  return frame.extended == identifier.extended && ((frame.id ^ identifier.id) & mask) == 0;
+}
 
 std::unique_ptr<CanSocket> openCanSocket(const std::string& interface, const std::string& helper) {
   checkInterface(interface);

@@ -5,22 +5,13 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <tuple>
 #include <utility>
 
 namespace tunnel_pilot::can {
-namespace {
-
-bool before(const Identifier& a, const Identifier& b) {
-  return std::tie(a.extended, a.id) < std::tie(b.extended, b.id);
-}
-
-}  // namespace
 
 SocketCanBus::SocketCanBus(std::string interface, std::vector<Identifier> listen,
                            std::unique_ptr<CanSocket> socket)
     : interface_(std::move(interface)), listen_(std::move(listen)), socket_(std::move(socket)) {
-  std::sort(listen_.begin(), listen_.end(), before);
   takeLink(socket_->link());
   interrupted_ = false;
 }
@@ -90,8 +81,8 @@ std::optional<Frame> SocketCanBus::take(const Received& received) {
 }
 
 bool SocketCanBus::listensTo(const Frame& frame) const {
-  return std::binary_search(listen_.begin(), listen_.end(), Identifier{frame.id, frame.extended},
-                            before);
+  return std::any_of(listen_.begin(), listen_.end(),
+                     [&](const Identifier& identifier) { return matches(identifier, frame); });
 }
 
 void SocketCanBus::takeEcho() {
@@ -199,7 +190,7 @@ std::string SocketCanBus::trouble() const {
   }
   if (!usable()) return "the driver of " + interface_ + " does not echo what was sent: use another";
   if (!bus_off_ && !stuck_ && !discarding_) return "";
-  const std::string what =
+  std::string what =
       bus_off_ ? interface_ + " is bus-off" : "frames are stuck in the queue of " + interface_;
   if (helper_failed_.empty()) return what;
   return what + ", can_link_cycle failed (" + helper_failed_ + "): " + set + " down; " + set + " up";

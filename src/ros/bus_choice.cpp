@@ -3,10 +3,9 @@
 #include <filesystem>
 #include <stdexcept>
 #include <string>
-#include <vector>
 
 #include "tunnel_pilot/can/embedded_bus.h"
-#include "tunnel_pilot/can/layout.h"
+#include "tunnel_pilot/can/profile.h"
 #include "tunnel_pilot/can/socket_can_bus.h"
 
 namespace tunnel_pilot::shell {
@@ -17,17 +16,25 @@ std::string helper() {
   return std::filesystem::read_symlink("/proc/self/exe").parent_path() / "can_link_cycle";
 }
 
-std::unique_ptr<can::Bus> joinInterface(const std::string& interface) {
-  std::vector<can::Identifier> listen;
-  for (const can::FrameLayout& layout : can::frameLayouts()) listen.push_back({layout.id, false});
-  return std::make_unique<can::SocketCanBus>(interface, listen, can::openCanSocket(interface, helper()));
+std::unique_ptr<can::Bus> joinInterface(const std::string& interface, const can::Profile& profile) {
+  return std::make_unique<can::SocketCanBus>(interface, can::identifiersOf(profile),
+                                             can::openCanSocket(interface, helper()));
+}
+
+/// The stage's own loader reads the profile again, and refuses what else there is.
+can::Profile profileOf(const Parameters& parameters) {
+  config::Node rest = parameters.rest();
+  return can::loadProfile(rest, can::Side::kPilot);
 }
 
 }  // namespace
 
 std::unique_ptr<can::Bus> takeBus(Parameters& parameters, bool simulated_time) {
   config::Node node = parameters.take({"bus", "interface"});
-  if (!node.has("interface")) return std::make_unique<can::EmbeddedBus>(node.text("bus"));
+  if (!node.has("interface")) {
+    const std::string name = node.text("bus");
+    return can::withProfile(profileOf(parameters), std::make_unique<can::EmbeddedBus>(name));
+  }
   const std::string interface = node.text("interface");
   if (node.has("bus")) {
     throw config::ConfigError("interface: there is a bus, too; give the name of an embedded bus or a " +
@@ -37,7 +44,8 @@ std::unique_ptr<can::Bus> takeBus(Parameters& parameters, bool simulated_time) {
     throw config::ConfigError("interface: '" + interface +
                               "' is not driven in simulated time: use_sim_time is set");
   }
-  return joinInterface(interface);
+  const can::Profile profile = profileOf(parameters);
+  return can::withProfile(profile, joinInterface(interface, profile));
 }
 
 }  // namespace tunnel_pilot::shell

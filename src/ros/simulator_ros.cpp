@@ -7,10 +7,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "tunnel_pilot/can/codec.h"
 #include "tunnel_pilot/can/embedded_bus.h"
 #include "tunnel_pilot/can/layout.h"
+#include "tunnel_pilot/can/profile.h"
 #include "tunnel_pilot/ros/conversions.h"
 #include "tunnel_pilot/ros/parameters.h"
 #include "tunnel_pilot/simulation/episode.h"
@@ -156,10 +158,9 @@ SimulatorRos::SimulatorRos(ros::NodeHandle nh, ros::NodeHandle private_nh) {
 void SimulatorRos::configure(const ros::NodeHandle& private_nh) {
   Parameters parameters(private_nh);
   const auto truck = takeTruck(parameters);
-  config::Node own = parameters.take(
-      {"truck_controller_file", "world_file", "bus", "load", "seed", "reversed", "real_time_factor"});
-  const auto controller =
-      simulation::loadTruckController(config::loadFile(own.text("truck_controller_file")));
+  config::Node own = parameters.take({"truck_controller_file", "world_file", "bus", "profile", "load",
+                                      "seed", "reversed", "real_time_factor"});
+  auto controller = simulation::loadTruckController(config::loadFile(own.text("truck_controller_file")));
   real_time_factor_ = own.number("real_time_factor", "1", 0.0, 1000.0);
   const auto seed = static_cast<std::uint64_t>(own.integer("seed", "1", 0, 1 << 30));
   const bool loaded = own.choice("load", {"empty", "loaded"}) == "loaded";
@@ -167,8 +168,10 @@ void SimulatorRos::configure(const ros::NodeHandle& private_nh) {
   options.seed = seed;
   options.reversed = own.boolean("reversed");
   auto world = world::loadWorld(own.text("world_file"), options);
-  bus_ = std::make_unique<BusTap>(std::make_unique<can::EmbeddedBus>(own.text("bus")),
-                                  can::kTpCommandInfoId);
+  if (own.has("profile")) controller.can.kind = can::readProfileKind(own, "profile");
+  auto wire = std::make_unique<can::EmbeddedBus>(own.text("bus"));
+  bus_ =
+      std::make_unique<BusTap>(can::withProfile(controller.can, std::move(wire)), can::kTpCommandInfoId);
   own.finish();
 
   const auto simulator = simulation::loadSimulator(parameters.rest());

@@ -17,8 +17,8 @@ constexpr double kSpeedIntegral = 0.5;    // ... who holds against rolling resis
 ClosedLoop::ClosedLoop(const Scenario& scenario, const Setup& setup, const PilotParameters& pilot,
                        world::World world, const EpisodePlan& plan)
     : truck_(setup.truck.geometry),
-      truck_side_(hub_.connect()),
-      pilot_side_(hub_.connect()),
+      truck_side_(can::withProfile(setup.truck_controller.can, hub_.connect())),
+      pilot_side_(can::withProfile(pilot.bridge.can, hub_.connect())),
       simulator_(setup.simulator, setup.truck_controller, setup.truck,
                  makePlant(scenario.plant, setup.truck, plan.seed), scenario.plant.load,
                  std::move(world), plan.seed, *truck_side_),

@@ -82,6 +82,9 @@ Setup loadSetup(const Scenario& scenario) {
               loadTruckController(config::loadFile(folder + "truck_controller.yaml")),
               loadPilot(scenario.config_folder, scenario.preview_law),
               {}};
+  can::Profile& pilots = setup.pilot.bridge.can;
+  if (scenario.profile) pilots.kind = setup.truck_controller.can.kind = *scenario.profile;
+  can::requireAgreement(pilots, setup.truck_controller.can);
   setup.fingerprints.scenario = sha256OfFiles({scenario.file});
   std::vector<std::string> controller = pilotFiles(scenario.config_folder);
   const drivers::PreviewDriverParameters& preview = setup.pilot.preview_driver;

@@ -162,6 +162,7 @@ Scenario loadScenario(const std::string& file) {
   scenario.title = node.text("title");
   scenario.config_folder = besideScenario(node, "config", base, true);
   if (node.has("preview_law")) scenario.preview_law = drivers::readPreviewLaw(node, "preview_law");
+  if (node.has("profile")) scenario.profile = can::readProfileKind(node, "profile");
   scenario.first_seed = static_cast<std::uint64_t>(node.integer("first_seed", "1", 0, 1'000'000'000));
   scenario.seeds = static_cast<int>(node.integer("seeds", "1", 1, 100'000));
   scenario.plant = loadPlant(node.child("plant"));

@@ -22,6 +22,7 @@ TruckControllerParameters loadTruckController(config::Node node) {
   p.override_brake = node.number("override_brake", "1", 0.01, 1.0);
   p.wheel_ratio = node.number("wheel_ratio", "1", 0.01, 1.0);
   p.full_brake_pressure = node.number("full_brake_pressure", "Pa", 1e5, 3e7);
+  p.can = can::loadProfile(node, can::Side::kTruck);
   node.finish();
   return p;
 }
@@ -79,6 +80,7 @@ vehicle::PlantInput TruckController::step(const SensedTruck& truck, Stamp now) {
 // -------- what it hears
 
 void TruckController::receive(Stamp now) {
+  bus_.tick(now);
   while (const std::optional<can::Frame> frame = bus_.receive()) {
     if (frame->extended) continue;
     if (frame->id == can::kTpCommandId) takeCommand(*frame, now);

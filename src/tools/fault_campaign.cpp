@@ -15,6 +15,7 @@
 #include "tunnel_pilot/bridge/can_bridge.h"
 #include "tunnel_pilot/can/log_writer.h"
 #include "tunnel_pilot/can/memory_bus.h"
+#include "tunnel_pilot/can/profile.h"
 #include "tunnel_pilot/can/protection.h"
 #include "tunnel_pilot/simulation/random.h"
 #include "tunnel_pilot/simulation/truck_controller.h"
@@ -35,10 +36,28 @@ struct Setup {
   vehicle::TruckParameters truck;
 };
 
-Setup loadSetup(const std::string& folder) {
-  return {bridge::loadBridge(config::loadFile(folder + "/can_bridge.yaml")),
-          simulation::loadTruckController(config::loadFile(folder + "/truck_controller.yaml")),
-          vehicle::loadTruck(folder + "/truck.yaml")};
+// An empty profile is that of the files.
+Setup loadSetup(const std::string& folder, const std::string& profile) {
+  Setup setup = {bridge::loadBridge(config::loadFile(folder + "/can_bridge.yaml")),
+                 simulation::loadTruckController(config::loadFile(folder + "/truck_controller.yaml")),
+                 vehicle::loadTruck(folder + "/truck.yaml")};
+  if (!profile.empty()) {
+    const bool j1939 = profile == toString(can::ProfileKind::kJ1939);
+    setup.bridge.can.kind = setup.controller.can.kind =
+        j1939 ? can::ProfileKind::kJ1939 : can::ProfileKind::kPlain;
+  }
+  can::requireAgreement(setup.bridge.can, setup.controller.can);
+  return setup;
+}
+
+can::Frame j1939Frame(std::uint8_t priority, std::uint32_t pgn, std::uint8_t source, std::uint64_t data,
+                      std::uint8_t length = 8) {
+  can::Frame frame;
+  frame.id = can::toIdentifier({priority, pgn, can::kGlobalAddress, source});
+  frame.extended = true;
+  frame.length = length;
+  for (std::size_t i = 0; i < length; ++i) frame.data[i] = static_cast<std::uint8_t>(data >> 8 * i);
+  return frame;
 }
 
 /// What a fault does to the traffic and the command while it lasts.
@@ -64,9 +83,10 @@ class Rig {
       : now_(start),
         tick_period_(tick_period),
         log_(log),
-        bridge_bus_(bridge_side_.connect()),
+        profile_(setup.bridge.can),
+        bridge_bus_(can::withProfile(profile_, bridge_side_.connect())),
         wire_to_bridge_(bridge_side_.connect()),
-        truck_bus_(truck_side_.connect()),
+        truck_bus_(can::withProfile(setup.controller.can, truck_side_.connect())),
         wire_to_truck_(truck_side_.connect()),
         bridge_(setup.bridge, setup.truck.geometry, *bridge_bus_),
         controller_(setup.controller, *truck_bus_),
@@ -110,11 +130,24 @@ class Rig {
 
   // -------- faults that come at once
 
-  void sendForeign(const can::Frame& frame) {
+  /// A frame under an identifier of the pilot's.
+  void sendForeign(can::Frame frame) {
+    frame.id = onWire(frame.id);
+    frame.extended = isJ1939();
     event("foreign " + can::toText(frame));
     if (log_ != nullptr) log_->frame(frame, now_);
     wire_to_bridge_->send(frame);
   }
+
+  /// Any other frame that is neither the pilot's nor the truck's.
+  void sendStrange(const can::Frame& frame) {
+    if (!bus_passes_) return;
+    if (log_ != nullptr) log_->frame(frame, now_);
+    wire_to_bridge_->send(frame);
+  }
+
+  bool isJ1939() const { return profile_.kind == can::ProfileKind::kJ1939; }
+  const can::J1939Parameters& pilot() const { return profile_.j1939; }
 
   void jumpClock(Stamp by) {
     offset_ += by;
@@ -203,7 +236,7 @@ class Rig {
   void carryToBridge(can::Frame frame) {
     if (faults.feedback_lost || !bus_passes_) return;
     if (faults.feedback_corrupt) frame.data[4] ^= 0x10;
-    if (frame.id == can::kTruckFeedbackId) {
+    if (frame.id == feedback_id_) {
       if (faults.counter_stands) frame = last_feedback_;
       last_feedback_ = frame;
     }
@@ -212,8 +245,21 @@ class Rig {
     wire_to_bridge_->send(frame);
   }
 
-  void look(const can::Frame& frame) {
-    if (frame.id != can::kTpCommandId) return;
+  // The identifier that a frame of the .dbc has on the wire.
+  std::uint32_t onWire(std::uint32_t id) const {
+    for (const can::J1939Group& group : can::j1939Groups()) {
+      if (!isJ1939() || group.id != id) continue;
+      const bool pilots = group.sender == can::Side::kPilot;
+      const std::uint8_t source = pilots ? pilot().source_address : pilot().partner_address;
+      return can::toIdentifier({group.priority, group.pgn, can::kGlobalAddress, source});
+    }
+    return id;
+  }
+
+  void look(can::Frame frame) {
+    if (frame.id != command_id_) return;
+    frame.id = can::kTpCommandId;
+    frame.extended = false;
     const auto command = can::decode<can::TruckCommandFrame>(frame);
     if (!command) return;
     if (command->steering_enable && !command->stop) {
@@ -226,6 +272,7 @@ class Rig {
   Stamp now_, offset_{}, tick_period_;
   can::LogWriter* log_;
   can::MemoryBusHub bridge_side_, truck_side_;
+  can::Profile profile_;
   std::unique_ptr<can::Bus> bridge_bus_, wire_to_bridge_, truck_bus_, wire_to_truck_;
   bridge::CanBridge bridge_;
   simulation::TruckController controller_;
@@ -233,6 +280,8 @@ class Rig {
   Stamp next_tick_, next_command_;
   std::optional<Stamp> not_driving_since_;
   can::Frame last_feedback_;
+  std::uint32_t command_id_ = onWire(can::kTpCommandId);
+  std::uint32_t feedback_id_ = onWire(can::kTruckFeedbackId);
   std::uint32_t sequence_ = 0;
   unsigned deaf_ = 0;
   bool bus_passes_ = true;
@@ -285,6 +334,7 @@ class Episode {
   void misbehave() {
     Faults& faults = rig_.faults;
     if (rig_.now() >= quiet_at_ && disturbed_) calm();
+    if (rig_.isJ1939()) misbehaveOnNetwork();
     if (!chance(0.25)) return;
     disturbed_ = true;
     quiet_at_ = rig_.now() + fromSeconds(0.02 + uniform() * uniform() * 1.5);
@@ -341,6 +391,22 @@ class Episode {
         foreign();
         break;
     }
+  }
+
+  // What other nodes of a J1939 network do: ask, claim the pilot's address under a higher NAME, or (for
+  // good, so seldom) a lower one, talk like the truck.
+  void misbehaveOnNetwork() {
+    const can::J1939Parameters& pilot = rig_.pilot();
+    const std::uint8_t stranger = 0x55;
+    const auto claim = [&](std::uint64_t name) {
+      rig_.sendStrange(j1939Frame(6, can::kAddressClaimedPgn, pilot.source_address, name));
+    };
+    if (chance(0.1)) {
+      rig_.sendStrange(j1939Frame(6, can::kRequestPgn, stranger, can::kAddressClaimedPgn, 3));
+    }
+    if (chance(0.05)) claim(pilot.name + 1);
+    if (chance(0.01)) claim(pilot.name - 1);
+    if (chance(0.1)) rig_.sendStrange(j1939Frame(3, 0xFF20, stranger, 0x1122334455667788));
   }
 
   void foreign() {
@@ -530,6 +596,7 @@ struct Arguments {
   long long cycles = 1'000'000;
   long long share = 1;
   std::uint64_t seed = 1;
+  std::string profile;
   bool latencies = false;
 };
 
@@ -543,6 +610,8 @@ bool parse(int argc, char** argv, Arguments& arguments) {
       "cycles", options::value(&arguments.cycles), "control cycles of 20 ms")(
       "share", options::value(&arguments.share), "writes every N-th minute only")(
       "seed", options::value(&arguments.seed), "of the faults")(
+      "profile", options::value(&arguments.profile)->value_name("NAME"),
+      "of the CAN bus: plain or j1939, instead of the files'")(
       "latencies", options::bool_switch(&arguments.latencies),
       "instead: the worst latency of each fault beside its limit; exit status 1 when one is broken");
   options::variables_map values;
@@ -554,6 +623,10 @@ bool parse(int argc, char** argv, Arguments& arguments) {
   options::notify(values);
   if (arguments.cycles < 1) throw options::error("--cycles must be 1 or more");
   if (arguments.share < 1) throw options::error("--share must be 1 or more");
+  const std::string& profile = arguments.profile;
+  if (!profile.empty() && profile != "plain" && profile != "j1939") {
+    throw options::error("--profile must be plain or j1939");
+  }
   return true;
 }
 
@@ -564,7 +637,7 @@ int main(int argc, char** argv) {
     std::ios::sync_with_stdio(false);
     Arguments arguments;
     if (!parse(argc, argv, arguments)) return 0;
-    const Setup setup = loadSetup(arguments.config);
+    const Setup setup = loadSetup(arguments.config, arguments.profile);
     if (arguments.latencies) return printLatencies(setup, arguments.seed) ? 0 : 1;
     runTraffic(setup, arguments.cycles, arguments.seed, arguments.share);
     return 0;

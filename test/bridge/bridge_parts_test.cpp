@@ -57,7 +57,7 @@ TEST(BridgeParameters, EveryKeyIsNeededAndOfTheRightKind) {
     }
     ++keys;
   }
-  EXPECT_EQ(keys, 26);
+  EXPECT_EQ(keys, 28);
   YAML::Node unknown = YAML::Clone(good);
   unknown["typo"] = 1;
   EXPECT_TRUE(refused(unknown, "typo"));

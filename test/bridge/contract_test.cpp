@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cstdio>
 #include <fstream>
 #include <map>
 #include <regex>
@@ -8,6 +9,7 @@
 
 #include "tunnel_pilot/bridge/safety_state.h"
 #include "tunnel_pilot/can/codec.h"
+#include "tunnel_pilot/can/profile.h"
 #include "tunnel_pilot/supervision/command.h"
 
 // What stands twice, in the code and in a document, must be the same.
@@ -23,8 +25,8 @@ std::string read(const std::string& name) {
 
 using ValueTable = std::map<int, std::string>;
 
-ValueTable valueTable(const std::string& frame, const std::string& signal) {
-  const std::string dbc = read("config/tunnel_pilot.dbc");
+ValueTable valueTable(const std::string& file, const std::string& frame, const std::string& signal) {
+  const std::string dbc = read(file);
   std::smatch line;
   ValueTable table;
   if (!std::regex_search(dbc, line, std::regex("\nVAL_ " + frame + " " + signal + " ([^\n]*) ;")))
@@ -49,11 +51,18 @@ ValueTable wordsOf() {
 }
 
 TEST(Dbc, ValueTablesAreTheEnumerationsOfTheCode) {
-  EXPECT_EQ(valueTable("272", "Mode"), wordsOf<supervision::Mode>());
-  EXPECT_EQ(valueTable("272", "Reason"), wordsOf<supervision::Reason>());
-  EXPECT_EQ(valueTable("274", "Reason"), wordsOf<supervision::Reason>());
-  EXPECT_EQ(valueTable("273", "Source"), wordsOf<supervision::Source>());
-  EXPECT_EQ(valueTable("274", "State"), wordsOf<SafetyState>());
+  struct File {
+    std::string name, command, info, status;
+  };
+  for (const File& file :
+       {File{"config/tunnel_pilot.dbc", "272", "273", "274"},
+        File{"config/tunnel_pilot_j1939.dbc", "2365526144", "2566852992", "2566853248"}}) {
+    EXPECT_EQ(valueTable(file.name, file.command, "Mode"), wordsOf<supervision::Mode>());
+    EXPECT_EQ(valueTable(file.name, file.command, "Reason"), wordsOf<supervision::Reason>());
+    EXPECT_EQ(valueTable(file.name, file.status, "Reason"), wordsOf<supervision::Reason>());
+    EXPECT_EQ(valueTable(file.name, file.info, "Source"), wordsOf<supervision::Source>());
+    EXPECT_EQ(valueTable(file.name, file.status, "State"), wordsOf<SafetyState>());
+  }
 }
 
 std::string stateList(const std::vector<SafetyState>& states) {
@@ -99,6 +108,31 @@ std::string framesAsMarkdown() {
 
 TEST(CanDocument, ListsTheFramesOfTheCode) {
   const std::string table = framesAsMarkdown();
+  EXPECT_NE(read("docs/can.md").find(table), std::string::npos) << "docs/can.md must hold:\n" << table;
+}
+
+std::string groupsAsMarkdown() {
+  const auto source = [](const char* file, can::Side side) {
+    config::Node node =
+        config::loadFile(std::string(TUNNEL_PILOT_SOURCE_DIR) + "/config/" + std::string(file));
+    return can::loadProfile(node, side).j1939.source_address;
+  };
+  const std::uint8_t pilot = source("can_bridge.yaml", can::Side::kPilot);
+  const std::uint8_t truck = source("truck_controller.yaml", can::Side::kTruck);
+  std::string table = "| frame | group | priority | identifier |\n|---|---|---|---|\n";
+  for (const can::J1939Group& group : can::j1939Groups()) {
+    const std::uint8_t sender = group.sender == can::Side::kPilot ? pilot : truck;
+    char line[96];
+    std::snprintf(line, sizeof line, "| %s | 0x%04X | %d | 0x%08X |\n", can::findLayout(group.id)->name,
+                  group.pgn, group.priority,
+                  can::toIdentifier({group.priority, group.pgn, can::kGlobalAddress, sender}));
+    table += line;
+  }
+  return table;
+}
+
+TEST(CanDocument, ListsTheGroupsOfTheCode) {
+  const std::string table = groupsAsMarkdown();
   EXPECT_NE(read("docs/can.md").find(table), std::string::npos) << "docs/can.md must hold:\n" << table;
 }
 

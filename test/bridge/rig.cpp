@@ -66,17 +66,25 @@ vehicle::TruckParameters Rig::truckParameters() { return vehicle::loadTruck(file
 
 Rig::Rig(double tick) : Rig(tick, nullptr) {}
 
-Rig::Rig(double tick, const MakeBus& make_bus)
-    : tick_period(tick), plant(truckParameters()), next_tick_(now), next_command_(now + ms(3)) {
-  bridge_end = bridge_side.connect();
+Rig::Rig(double tick, const MakeBus& make_bus) : Rig(tick, make_bus, can::ProfileKind::kPlain) {}
+
+Rig::Rig(double tick, can::ProfileKind kind) : Rig(tick, nullptr, kind) {}
+
+Rig::Rig(double tick, const MakeBus& make_bus, can::ProfileKind kind)
+    : tick_period(tick),
+      profile(kind),
+      plant(truckParameters()),
+      next_tick_(now),
+      next_command_(now + ms(3)) {
+  const auto controller_parameters = simulation::loadTruckController(file("truck_controller.yaml"));
+  bridge_end = can::withProfile({kind, bridgeParameters().can.j1939}, bridge_side.connect());
   wire_to_bridge = bridge_side.connect();
-  truck_bus = truck_side.connect();
+  truck_bus = can::withProfile({kind, controller_parameters.can.j1939}, truck_side.connect());
   wire_to_truck = truck_side.connect();
   if (make_bus) bridge_bus = make_bus(*bridge_end);
   bridge = std::make_unique<CanBridge>(bridgeParameters(), truckParameters().geometry,
                                        bridge_bus ? *bridge_bus : *bridge_end);
-  controller = std::make_unique<simulation::TruckController>(
-      simulation::loadTruckController(file("truck_controller.yaml")), *truck_bus);
+  controller = std::make_unique<simulation::TruckController>(controller_parameters, *truck_bus);
   plant.reset(geometry::Pose(), 0.0, 0.0);
   command.speed = 3.0;
   command.acceleration = 0.8;
@@ -119,9 +127,19 @@ void Rig::moveTruck() {
   plant.step(input, vehicle::PlantSurroundings(), 1e-3);
 }
 
+can::Frame Rig::plain(can::Frame frame) const {
+  if (profile == can::ProfileKind::kPlain) return frame;
+  for (const can::J1939Group& group : can::j1939Groups()) {
+    if (group.pgn != can::fromIdentifier(frame.id).pgn) continue;
+    frame.id = group.id;
+    frame.extended = false;
+  }
+  return frame;
+}
+
 void Rig::pump() {
   while (const auto frame = wire_to_bridge->receive()) {
-    judge.frame(*frame, bridge->status(), last_feedback, now);
+    judge.frame(plain(*frame), bridge->status(), last_feedback, now);
     log.push_back(*frame);
     if (const auto passed = to_truck(*frame)) wire_to_truck->send(*passed);
   }
@@ -129,7 +147,7 @@ void Rig::pump() {
     log.push_back(*frame);
     const auto passed = to_bridge(*frame);
     if (!passed) continue;
-    if (can::decode<can::TruckFeedbackFrame>(*passed)) last_feedback = now;
+    if (can::decode<can::TruckFeedbackFrame>(plain(*passed))) last_feedback = now;
     wire_to_bridge->send(*passed);
   }
 }

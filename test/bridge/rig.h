@@ -45,6 +45,10 @@ class Rig {
   using MakeBus = std::function<std::unique_ptr<can::Bus>(can::Bus& wire)>;
   Rig(double tick_period, const MakeBus& make_bus);
 
+  /// With both sides on this profile. The wire, `log` and the filters on it have its identifiers; the
+  /// judge is given those of 11 bits.
+  Rig(double tick_period, can::ProfileKind profile);
+
   /// Runs for a time [s]; `until` ends it early (looked at every ms).
   void run(
       double seconds, const std::function<bool()>& until = [] { return false; });
@@ -80,6 +84,7 @@ class Rig {
   };
   std::function<std::optional<can::Frame>(can::Frame)> to_truck = to_bridge;
 
+  can::ProfileKind profile = can::ProfileKind::kPlain;
   can::MemoryBusHub bridge_side, truck_side;
   std::unique_ptr<can::Bus> bridge_end, bridge_bus, truck_bus, wire_to_bridge, wire_to_truck;
   std::unique_ptr<CanBridge> bridge;
@@ -91,6 +96,8 @@ class Rig {
   std::vector<can::Frame> log;  ///< all frames, both ways
 
  private:
+  Rig(double tick_period, const MakeBus& make_bus, can::ProfileKind profile);
+  can::Frame plain(can::Frame frame) const;
   void step();
   void sendCommand();
   void moveTruck();

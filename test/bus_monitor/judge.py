@@ -7,6 +7,7 @@ from collections import Counter, deque
 from dataclasses import dataclass
 
 import dbc
+from network import EXTENDED, PRIORITY, Network
 from protection import counter_step, frame_crc
 
 MS = 1000  # [us]
@@ -33,10 +34,20 @@ STAMP_MODULUS = 65536  # [ms]
 NEVER = -10**18
 
 
+def key_of(identifier):
+    """What a frame is known by: under J1939 its priority says nothing."""
+    return identifier & ~PRIORITY if identifier & EXTENDED else identifier
+
+
+def _text(identifier, length, data, remote):
+    number = f'{identifier & ~EXTENDED:08X}#' if identifier & EXTENDED else f'{identifier:03X}#'
+    return number + ('R' if remote else data.to_bytes(8, 'little')[:length].hex().upper())
+
+
 @dataclass
 class Finding:
     time: int  # [us]
-    clause: str  # a..e of the definition
+    clause: str  # a..f of the definition
     kind: str
     detail: str
     frame: str
@@ -64,7 +75,7 @@ class Stream:
     """One identifier: its layout, its counter, the times of its last frames."""
 
     def __init__(self, layout):
-        self.identifier, self.length, self.data_id = layout.identifier, layout.length, layout.data_id
+        self.identifier, self.length, self.data_id = key_of(layout.identifier), layout.length, layout.data_id
         self.name = layout.name
         self.checked = [(name, s) for name, s in layout.signals.items()
                         if name != 'Crc' and (s.low > (-s.sign) or s.high < (s.mask >> (1 if s.sign else 0)))]
@@ -95,17 +106,22 @@ class Stream:
 class Judge:
     """Feed it frames and events in the order of their time; what happened off the bus comes before a frame of the
     same time. `events`: False when no log of events is to be had; what hangs on it is then not judged.
-    `jitter` [us]: how late a time stamp may be, on a live bus."""
+    `jitter` [us]: how late a time stamp may be, on a live bus. `name`: the pilot's NAME on a J1939 network, None: that of
+    the first who claims its address."""
 
-    def __init__(self, dbc_file, events=True, jitter=0):
+    def __init__(self, dbc_file, events=True, jitter=0, name=None):
         layouts = dbc.read(dbc_file)
         self.events_known, self.jitter = events, jitter
-        self.streams = {frame.identifier: Stream(frame) for frame in layouts.values()}
-        self.names = {name: frame.identifier for name, frame in layouts.items()}
+        self.streams = {key_of(frame.identifier): Stream(frame) for frame in layouts.values()}
+        self.names = {frame.name: key_of(frame.identifier) for frame in layouts.values()}
         self.signals = {name: frame.signals for name, frame in layouts.items()}
         self.states = layouts['TP_STATUS'].values['State']
         self.sources = {word: n for n, word in layouts['TP_COMMAND_INFO'].values['Source'].items()}
-        self.pilot = {frame.identifier for frame in layouts.values() if frame.sender == 'PILOT'}
+        self.pilot = {key_of(frame.identifier) for frame in layouts.values() if frame.sender == 'PILOT'}
+        self.network = None  # of the profile plain
+        if all(identifier & EXTENDED for identifier in self.pilot):
+            self.network = Network(self.pilot, name, not events,
+                                   lambda time, kind, detail, text: self._find(time, 'f', kind, detail, text))
         self.required = [self.streams[self.names[name]]
                          for name in ('TRUCK_FEEDBACK', 'TRUCK_MOTION', 'TRUCK_STATUS')]
         self.handlers = {self.names['TP_COMMAND']: self._command, self.names['TP_COMMAND_INFO']: self._info,
@@ -156,6 +172,8 @@ class Judge:
 
     def _new_pilot_event(self, time):
         self._new_pilot(time)
+        if self.network:
+            self.network.start()
 
     def _engage(self, time):
         self.edge = time
@@ -186,6 +204,8 @@ class Judge:
             self.streams[identifier].restart()
         self.source_time = self.state_time = time
         self.bus_broke = True
+        if self.network:
+            self.network.bus(time, state == 'up')
 
     def _clock(self, _time, offset):
         self.clock_offset = round(float(offset) * MS)
@@ -194,20 +214,32 @@ class Judge:
 
     def frame(self, time, identifier, length, data, remote=False, sender=None):
         """`data`: the bytes as a little-endian number. `sender` True: known to be the pilot, False: known to be
-        somebody else, None: not known. 29-bit identifiers are not to be given."""
-        stream = self.streams.get(identifier)
+        somebody else, None: not known. Identifiers of 29 bits have bit 31 set."""
+        key = key_of(identifier)
+        stream = self.streams.get(key)
         self.counts['frames'] += 1
+        before = len(self.findings)
+        if self.network and identifier & EXTENDED and stream is None:
+            self._other_network_frame(time, identifier, length, data, remote)
         if stream is None:
             self.counts['other frames'] += 1
-            return
-        ours = identifier in self.pilot
-        if ours:
-            text = f'{identifier:03X}#' + ('R' if remote else data.to_bytes(8, 'little')[:length].hex().upper())
-            before = len(self.findings)
-            self._pilot_frame(time, stream, length, data, remote, sender, text)
-            self.unsafe_frames += len(self.findings) > before
-            return
-        handler = self.handlers.get(identifier)
+        elif key in self.pilot:
+            self._pilot_frame(time, stream, length, data, remote, sender, _text(identifier, length, data, remote))
+        else:
+            self._truck_frame(time, stream, length, data, remote)
+        self.unsafe_frames += len(self.findings) > before
+
+    def is_pilots(self, identifier):
+        return key_of(identifier) in self.pilot
+
+    def _other_network_frame(self, time, identifier, length, data, remote):
+        text = _text(identifier, length, data, remote)
+        managed = not remote and self.network.hear(time, identifier, length, data, text)
+        if not managed and self.network.is_foreign(identifier):
+            self._find(time, 'e', 'foreign', 'sent by somebody else', text)
+
+    def _truck_frame(self, time, stream, length, data, remote):
+        handler = self.handlers.get(stream.identifier)
         if handler is None:
             return
         if remote or stream.wrong(length, data) or not stream.step(data):
@@ -222,6 +254,8 @@ class Judge:
             if sender is not False:
                 self.foreign[text] -= 1
             return self._find(time, 'e', 'foreign', 'sent by somebody else', text)
+        if self.network:
+            self.network.pilot_frame(time, self.jitter, text)
         if len(stream.times) == WINDOW_FRAMES and time - stream.times[0] + self.jitter <= WINDOW:
             self._find(time, 'b', 'period', f'{WINDOW_FRAMES + 1} in {(time - stream.times[0]) / MS:g} ms', text)
         stream.times.append(time)
@@ -306,7 +340,9 @@ class Judge:
                 self._find(time, 'c', 'steers on old feedback', f'{stream.name} {told}', text)
         if self.taken_over is not None and time - self.taken_over > TAKE_OVER_LIMIT + self.jitter:
             self._find(time, 'c', 'steers against the operator', f'{(time - self.taken_over) / MS:g} ms', text)
-        for word, since in (('source', self.source_time), ('state', self.state_time)):
+        could_speak = self.network.may_speak or NEVER if self.network else NEVER
+        for word, told in (('source', self.source_time), ('state', self.state_time)):
+            since = max(told, could_speak)
             if time - since > UNTOLD_LIMIT + self.jitter:
                 self._find(time, 'c', f'{word} not told', f'for {(time - since) / MS:g} ms', text)
 

@@ -22,7 +22,8 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 import traffic  # noqa: E402
 from judge import MS, Judge  # noqa: E402
 
-DBC = pathlib.Path(__file__).resolve().parents[2] / 'config' / 'tunnel_pilot.dbc'
+CONFIG = pathlib.Path(__file__).resolve().parents[2] / 'config'
+DBC = {'plain': CONFIG / 'tunnel_pilot.dbc', 'j1939': CONFIG / 'tunnel_pilot_j1939.dbc'}
 SHOWN = 20  # findings in the summary
 
 
@@ -34,13 +35,17 @@ def arguments():
     where.add_argument('--interface', metavar='NAME')
     parser.add_argument('--events', metavar='FILE', help='the log of events, when it is not among the frames')
     parser.add_argument('--no-events', action='store_true', help='there is none; live always so')
-    parser.add_argument('--dbc', default=str(DBC), metavar='FILE')
+    parser.add_argument('--profile', choices=list(DBC), default='plain', help='of the bus: which .dbc of config/')
+    parser.add_argument('--dbc', metavar='FILE', help='instead of it')
+    parser.add_argument('--name', metavar='NAME', type=lambda text: int(text, 0),
+                        help="the pilot's NAME under j1939; default: of whoever first claims its address")
     parser.add_argument('--jitter', type=float, metavar='MS', help='of time stamps; 0 for a log, 10 live')
     parser.add_argument('--seconds', type=float, default=float('inf'), help='live: for so long (or until interrupted)')
     parser.add_argument('--json', action='store_true', help='the whole report instead of the summary')
     parsed = parser.parse_args()
     if parsed.log is None and parsed.events:
         parser.error('--events goes with a log')
+    parsed.dbc = parsed.dbc or str(DBC[parsed.profile])
     return parsed
 
 
@@ -49,7 +54,7 @@ def opened(stack, name):
 
 
 def judged_log(options):
-    judge = Judge(options.dbc, not options.no_events, round((options.jitter or 0.0) * MS))
+    judge = Judge(options.dbc, not options.no_events, round((options.jitter or 0.0) * MS), options.name)
     with contextlib.ExitStack() as stack:
         names = [options.log] + ([options.events] if options.events else [])
         traffic.judge_log(judge, *(opened(stack, name) for name in names))
@@ -59,7 +64,7 @@ def judged_log(options):
 
 
 def judged_live(options):
-    judge = Judge(options.dbc, False, round((10.0 if options.jitter is None else options.jitter) * MS))
+    judge = Judge(options.dbc, False, round((10.0 if options.jitter is None else options.jitter) * MS), options.name)
     bus = traffic.EmbeddedBus(options.embedded) if options.embedded else traffic.KernelBus(options.interface)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:

@@ -18,35 +18,36 @@ import traffic  # noqa: E402
 from judge import Judge  # noqa: E402
 from protection import crc, frame_crc  # noqa: E402
 
-DBC = HERE.parents[1] / 'config' / 'tunnel_pilot.dbc'
+CONFIG = HERE.parents[1] / 'config'
+DBC = {'plain': CONFIG / 'tunnel_pilot.dbc', 'j1939': CONFIG / 'tunnel_pilot_j1939.dbc'}
 
 
-def judged(items):
-    judge = Judge(DBC)
-    traffic.judge_log(judge, list(seeded_traffic.log_lines(items, DBC)))
+def judged(items, profile):
+    judge = Judge(DBC[profile])
+    traffic.judge_log(judge, list(seeded_traffic.log_lines(items, DBC[profile])))
     return judge
 
 
-def wrong_verdicts(kinds, count, expected_of):
+def wrong_verdicts(profile, kinds, count, expected_of):
     """Senders whose findings are not the expected ones (None: no finding)."""
     for seed in range(count):
         sender = kinds[seed % len(kinds)]
         act, expected = (sender, None) if expected_of is None else sender
-        drive = seeded_traffic.Drive(seed).started()
+        drive = seeded_traffic.Drive(seed, profile == 'j1939').started()
         began = drive.time
         act(drive)
-        found = judged(drive.items)
+        found = judged(drive.items, profile)
         told = dict(found.reasons)
         if expected is None and told:
-            yield f'good sender {act.__name__}, seed {seed}: {told}; {found.findings[0]}'
+            yield f'{profile}: good sender {act.__name__}, seed {seed}: {told}; {found.findings[0]}'
         elif expected and not fnmatch.filter(told, expected):
-            yield f'bad sender {act.__name__}, seed {seed}: {expected} was not found, but {told}'
+            yield f'{profile}: bad sender {act.__name__}, seed {seed}: {expected} was not found, but {told}'
         elif expected and found.findings[0].time < began:
-            yield f'bad sender {act.__name__}, seed {seed}: blamed before it misbehaved; {found.findings[0]}'
+            yield f'{profile}: bad sender {act.__name__}, seed {seed}: blamed before it misbehaved; {found.findings[0]}'
 
 
 def wrong_decodings():
-    layouts = dbc.read(DBC)
+    layouts = dbc.read(DBC['plain'])
     if crc(b'123456789') != 0xDF:
         yield 'check value of the CRC'
     lines = (HERE.parent / 'can' / 'vectors.csv').read_text().splitlines()
@@ -69,11 +70,13 @@ def main():
     parser.add_argument('--good', type=int, default=100)
     options = parser.parse_args()
     wrong = list(wrong_decodings())
-    wrong += wrong_verdicts(seeded_traffic.BAD, options.bad, True)
-    wrong += wrong_verdicts(seeded_traffic.GOOD, options.good, None)
-    print('\n'.join(wrong))
-    print(f'{options.bad} bad senders of {len(seeded_traffic.BAD)} kinds, {options.good} good ones of '
-          f'{len(seeded_traffic.GOOD)}: {len(wrong)} wrong verdicts')
+    kinds = {'plain': (seeded_traffic.BAD, seeded_traffic.GOOD),
+             'j1939': (seeded_traffic.BAD + seeded_traffic.J1939_BAD, seeded_traffic.GOOD + seeded_traffic.J1939_GOOD)}
+    for profile, (bad, good) in kinds.items():
+        wrong += wrong_verdicts(profile, bad, options.bad, True)
+        wrong += wrong_verdicts(profile, good, options.good, None)
+        print(f'{profile}: {options.bad} bad senders of {len(bad)} kinds, {options.good} good ones of {len(good)}')
+    print('\n'.join(wrong + [f'{len(wrong)} wrong verdicts']))
     return 1 if wrong else 0
 
 

@@ -13,12 +13,14 @@ from protection import frame_crc
 
 PERIOD = 20 * MS
 PREVIEW, HOLD, DEAD_RECKONING = 2, 8, 7
+OWN_NAME = 0x3000FF00FFE00001
+REQUEST = '18EAFF55#00EE00'
 
 
 class Drive:
     """One healthy drive: power-up, engage, drive, and what its script asks for."""
 
-    def __init__(self, seed):
+    def __init__(self, seed, j1939=False):
         self.random = random.Random(seed)
         self.items = []
         self.time = self.random.randrange(10**9, 10**12)
@@ -33,12 +35,22 @@ class Drive:
         self.unsteady = MS  # [us] by which the truck's phase varies
         self.amplitude, self.rhythm = self.random.uniform(2.0, 12.0), self.random.uniform(4.0, 9.0)
         self.event('start')
+        if j1939:
+            self.claim()
+            self.time += 250 * MS
 
     def event(self, *words):
         self.items.append(('event', self.time, list(words)))
 
     def frame(self, name, **fields):
         self.items.append(('frame', self.time, name, fields))
+
+    def raw(self, text):
+        """A frame that is in no .dbc, as `candump -L` writes it."""
+        self.items.append(('raw', self.time, text))
+
+    def claim(self, name=OWN_NAME, source=0x80):
+        self.raw(f'18EEFF{source:02X}#{name.to_bytes(8, "little").hex().upper()}')
 
     def cycle(self, state, stop=False, source=PREVIEW, count_on=True):
         """20 ms of both sides: the truck first, the pilot 7 ms later."""
@@ -471,19 +483,159 @@ BAD = [(wrong_length, 'a length'), (remote_frame, 'a length'), (wrong_crc, 'a cr
        (steers_against_the_operator, 'c steers against the operator'), (hides_its_state, 'c * not told')]
 
 
+# ---- on a J1939 network, beside the ones above
+
+def defends_its_address(drive):
+    for _ in range(3):
+        drive.claim(OWN_NAME + drive.random.choice([1, 1000]))
+        drive.run(ACTIVE, drive.random.randrange(1, 12))
+        drive.claim()
+        drive.raw(REQUEST)
+        drive.run(ACTIVE, 2)
+        drive.claim()
+        drive.drive(20)
+
+
+def loses_its_address(drive):
+    """And is silent at once, tells it, is asked and tells it again; then somebody starts it anew."""
+    drive.claim(OWN_NAME - 1)
+    if drive.random.random() < 0.5:
+        drive.run(ACTIVE, 2)
+    drive.silent_command = True
+    for _ in range(2):
+        drive.run(STOPPED, drive.random.randrange(8))
+        drive.claim(source=254)
+        drive.run(STOPPED, 50)
+        drive.raw(REQUEST)
+    drive.claim(source=254)
+    drive.run(STOPPED, 20)
+    drive.event('start')
+    drive.claim()
+    drive.run(STOPPED, 13)
+    drive.silent_command = drive.repeat = False
+    drive.speed, drive.sequence = 0.0, 0
+    drive.power_up()
+    drive.engage()
+    drive.drive()
+
+
+def strangers_on_the_network(drive):
+    """Frames of other nodes, of the truck's groups too, are nothing of ours; a priority says nothing."""
+    for text in ('0CFF2055#1122334455667788', '18FEF103#FFFFFFFFFFFFFFFF', '18EEFF55#0000000000000000', '110#00',
+                 '18EA5581#00EE00', '0CF00400#FFFFFFFFFFFFFFFF'):
+        drive.raw(text)
+        drive.cycle(ACTIVE)
+    drive.drive()
+
+
+def bus_back_and_claimed_anew(drive):
+    drive.stop()
+    drive.event('bus', 'down')
+    drive.time += 500 * MS
+    drive.event('bus', 'up')
+    drive.claim()
+    drive.time += 250 * MS
+    drive.run(STOPPED, 20, stop=True)
+
+
+J1939_GOOD = [defends_its_address, loses_its_address, strangers_on_the_network, bus_back_and_claimed_anew]
+
+
+def _bus_dip(drive):
+    drive.stop()
+    drive.event('bus', 'down')
+    drive.time += 500 * MS
+    drive.event('bus', 'up')
+
+
+def speaks_without_a_claim(drive):
+    _bus_dip(drive)
+    drive.run(STOPPED, 1, stop=True)
+
+
+def speaks_too_soon_after_its_claim(drive):
+    """At 249.999 ms at the latest."""
+    _bus_dip(drive)
+    drive.claim()
+    drive.time += drive.random.choice([0, 100 * MS, 250 * MS - 13 * MS - 1])
+    drive.unsteady = 1
+    drive.run(STOPPED, 1, stop=True)
+
+
+def speaks_after_it_lost_its_address(drive):
+    """One frame 60 ms and 1 us after the lower NAME, or later."""
+    drive.claim(OWN_NAME - drive.random.choice([1, 500]))
+    lost = drive.time
+    drive.silent_command = True
+    drive.run(STOPPED, 2)
+    drive.time, drive.silent_command = lost + 60 * MS + drive.random.choice([1, 1000, 100 * MS]), False
+    drive._pilot(STOPPED, True, HOLD, False)
+
+
+def claims_a_lost_address_again(drive):
+    drive.claim(OWN_NAME - 1)
+    drive.silent_command = True
+    drive.run(STOPPED, 10)
+    drive.claim()
+
+
+def keeps_its_address_without_a_word(drive):
+    drive.claim(OWN_NAME + 1)
+    drive.run(ACTIVE, 15)
+
+
+def ignores_a_request(drive):
+    drive.raw(drive.random.choice([REQUEST, '18EA80FE#00EE00']))
+    drive.run(ACTIVE, 15)
+
+
+def loses_its_address_without_a_word(drive):
+    drive.claim(OWN_NAME - 1)
+    drive.silent_command = True
+    drive.run(STOPPED, 15)
+    drive.raw('18FEF103#FFFFFFFFFFFFFFFF')
+
+
+def tells_its_loss_again_and_again(drive):
+    drive.claim(OWN_NAME - 1)
+    drive.silent_command = True
+    drive.run(STOPPED, 5)
+    drive.claim(source=254)
+    drive.run(STOPPED, 5)
+    drive.claim(source=254)
+
+
+def our_group_from_another_address(drive):
+    drive.raw(drive.random.choice(['0CFF1055', '18FF1181', '18FF12FE', '00FF1000']) + '#0000000000000000')
+
+
+def our_address_with_another_group(drive):
+    drive.raw(drive.random.choice(['18FEF180', '0CFF2080', '00000080', '18EAFF80']) + '#00EE00')
+
+
+J1939_BAD = [(speaks_without_a_claim, 'f not claimed'), (speaks_too_soon_after_its_claim, 'f not claimed'),
+             (speaks_after_it_lost_its_address, 'f address lost'), (claims_a_lost_address_again, 'f claims again'),
+             (keeps_its_address_without_a_word, 'f claim not defended'), (ignores_a_request, 'f request not answered'),
+             (loses_its_address_without_a_word, 'f loss not told'),
+             (tells_its_loss_again_and_again, 'f loss told unasked'), (our_group_from_another_address, 'e foreign'),
+             (our_address_with_another_group, 'e foreign')]
+
+
 # ---- on the wire
 
 def frame_text(layouts, name, fields):
     layout = layouts[name]
+    extended = layout.identifier >> 31
+    number = f'{layout.identifier & 0x1FFFFFFF:08X}' if extended else f'{layout.identifier:03X}'
     if fields.get('remote'):
-        return f'{layout.identifier:03X}#R8'
+        return f'{number}#R8'
     data = 0
     for signal, value in fields.items():
         if signal in layout.signals:
             data |= layout.signals[signal].encoded(value)
     data |= frame_crc(data, fields.get('data_id', layout.data_id))
     data ^= fields.get('flip', 0)
-    return f'{layout.identifier:03X}#{data.to_bytes(8, "little")[:fields.get("length", 8)].hex().upper()}'
+    return f'{number}#{data.to_bytes(8, "little")[:fields.get("length", 8)].hex().upper()}'
 
 
 def log_lines(items, dbc_file):
@@ -493,6 +645,8 @@ def log_lines(items, dbc_file):
         stamp = f'({time // 1000000}.{time % 1000000:06d})'
         if kind == 'event':
             yield f'{stamp} event {" ".join(rest[0])}'
+        elif kind == 'raw':
+            yield f'{stamp} can0 {rest[0]}'
         elif kind == 'foreign':
             yield f'{stamp} event foreign {frame_text(layouts, *rest)}'
         else:

@@ -72,11 +72,12 @@ def judge_log(judge, *logs):
 
 
 def _give(judge, stamp, identifier, length, data, sender):
-    if identifier & (EXTENDED | ERROR):
+    if identifier & ERROR:
         judge.counts['other frames'] += 1
         judge.counts['frames'] += 1
         return
-    judge.frame(stamp, identifier & 0x7FF, length, data, bool(identifier & REMOTE), sender)
+    number = identifier & (EXTENDED | 0x1FFFFFFF if identifier & EXTENDED else 0x7FF)
+    judge.frame(stamp, number, length, data, bool(identifier & REMOTE), sender)
 
 
 def embedded_folder(name):
@@ -115,7 +116,7 @@ class EmbeddedBus:
                   self._is_pilot(judge, identifier, sender))
 
     def _is_pilot(self, judge, identifier, sender):
-        if identifier not in judge.pilot:
+        if identifier & (REMOTE | ERROR) or not judge.is_pilots(identifier):
             return None
         self.pilot = self.pilot or sender
         return sender == self.pilot

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Frames made by an independent codec (cantools, from PyPI) out of config/tunnel_pilot.dbc.
+"""Frames made by an independent codec (cantools, from PyPI) out of config/tunnel_pilot.dbc and, which must be the same,
+out of config/tunnel_pilot_j1939.dbc.
 
   make_vectors.py --write     writes vectors.csv beside this file
   make_vectors.py --check     makes them again and compares; exit status 77 where cantools cannot be had
@@ -19,7 +20,8 @@ import sys
 import venv
 
 HERE = pathlib.Path(__file__).resolve().parent
-DBC = HERE.parents[1] / 'config' / 'tunnel_pilot.dbc'
+CONFIG = HERE.parents[1] / 'config'
+DBC, DBC_J1939 = CONFIG / 'tunnel_pilot.dbc', CONFIG / 'tunnel_pilot_j1939.dbc'
 VECTORS = HERE / 'vectors.csv'
 RANDOM_LINES = 40  # of each kind and frame
 CANTOOLS = 'cantools==40.2.3'
@@ -81,12 +83,12 @@ def boundary_lines(rng, message):
             yield encode_line(message, values)
 
 
-def make_lines():
+def make_lines(dbc):
     import cantools
     rng = random.Random(20190707)
-    database = cantools.database.load_file(str(DBC))
+    database = cantools.database.load_file(str(dbc))
     lines = []
-    for message in sorted(database.messages, key=lambda m: m.frame_id):
+    for message in sorted(database.messages, key=lambda m: m.dbc.attributes['DataId'].value):
         lines += boundary_lines(rng, message)
         for _ in range(RANDOM_LINES):
             lines.append(encode_line(message, {s.name: random_value(rng, s) for s in payload_signals(message)}))
@@ -124,10 +126,13 @@ def main():
     if options.venv:
         return rerun_in_venv(options.venv, ['--write' if options.write else '--check'])
     try:
-        lines = make_lines()
+        lines, j1939 = make_lines(DBC), make_lines(DBC_J1939)
     except ImportError:
         print('cantools is not installed: nothing checked')
         return 77
+    if lines != j1939:
+        print(f'cantools makes other frames of {DBC_J1939} than of {DBC}')
+        return 1
     if options.write:
         VECTORS.write_text(lines)
         print(f'{VECTORS}: {lines.count(chr(10))} vectors')

@@ -229,6 +229,11 @@ TEST(BadParameters, ABridgeTakesOneBusAlone) {
   EXPECT_NE(std::string::npos, both.find("interface: there is a bus, too")) << both;
 }
 
+TEST(BadParameters, ABridgeRefusesAnUnknownProfile) {
+  const std::string odd = refusalOfBridge("odd_profile", {{"bus", "embedded"}, {"profile", "canopen"}});
+  EXPECT_NE(std::string::npos, odd.find("'profile'")) << odd;
+}
+
 TEST(BadParameters, ABridgeRefusesAnInterfaceThatNoneCanBe) {
   const std::string odd = refusalOfBridge("odd_interface", {{"interface", "can0; reboot"}});
   EXPECT_NE(std::string::npos, odd.find("'can0; reboot'")) << odd;

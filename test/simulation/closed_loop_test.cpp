@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <sstream>
 
 #include "tunnel_pilot/can/memory_bus.h"
 #include "tunnel_pilot/simulation/episode.h"
@@ -148,6 +149,21 @@ TEST(Episode, DrivesItsWayAndTellsItsFigures) {
   EXPECT_NEAR(result.metrics.at("lap_efficiency") * result.metrics.at("lap_time"), 16.25, 0.05);
   EXPECT_GT(result.metrics.at("lap_efficiency"), 0.85);
   EXPECT_LE(result.metrics.at("lap_efficiency"), 1.0);
+}
+
+TEST(Episode, DrivesItsWayOverJ1939AndPutsNothingElseOnTheBus) {
+  Scenario scenario = straightDrive();
+  scenario.profile = can::ProfileKind::kJ1939;
+  std::ostringstream log;
+  EpisodePlan plan{kSeed, false};
+  plan.can_log = &log;
+  const EpisodeResult result = runEpisode(scenario, loadSetup(scenario), plan);
+  EXPECT_EQ(result.ending, "way driven");
+  EXPECT_NE(log.str().find(" 18EEFF80#"), std::string::npos) << "the pilot's claim";
+  EXPECT_NE(log.str().find(" 0CFF1080#"), std::string::npos);
+  EXPECT_NE(log.str().find(" 0CFF2081#"), std::string::npos);
+  EXPECT_EQ(log.str().find(" 110#"), std::string::npos);
+  EXPECT_EQ(log.str().find(" 120#"), std::string::npos);
 }
 
 TEST(Episode, DependsOnItsSeedAlone) {

@@ -77,6 +77,12 @@ TEST_F(ScenarioFile, IsReadAsItStands) {
   EXPECT_EQ(scenario.goals[0].judge, Judge::kEverySeed);
   EXPECT_FALSE(scenario.goals[1].max.has_value());
   EXPECT_EQ(scenario.config_folder, (folder_ / "config").string());
+  EXPECT_FALSE(scenario.profile.has_value());
+}
+
+TEST_F(ScenarioFile, MayChooseTheProfileOfTheBus) {
+  EXPECT_EQ(load("profile: j1939" + kGood).profile, can::ProfileKind::kJ1939);
+  EXPECT_EQ(load("profile: plain" + kGood).profile, can::ProfileKind::kPlain);
 }
 
 struct Fault {
@@ -93,6 +99,7 @@ TEST_F(ScenarioFile, EveryFaultIsRefusedNamingFileAndKey) {
       {"config: config", "config: nowhere", "nowhere', which is no folder"},
       {"config: config", "config: world.yaml", "world.yaml', which is no folder"},
       {"config: config\n", "", "'config' is missing"},
+      {"first_seed: 1", "first_seed: 1\nprofile: canopen", "'profile'"},
       {"first_seed: 1", "first_seed: -1", "'first_seed'"},
       {"first_seed: 1", "first_seed: 1.5", "'first_seed'"},
       {"seeds: 3", "seeds: 0", "'seeds'"},

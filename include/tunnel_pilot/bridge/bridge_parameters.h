@@ -5,6 +5,7 @@
 
 #include "tunnel_pilot/bridge/odometry.h"
 #include "tunnel_pilot/bridge/odometry_error.h"
+#include "tunnel_pilot/can/profile.h"
 #include "tunnel_pilot/config/node.h"
 
 namespace tunnel_pilot::bridge {
@@ -46,6 +47,7 @@ struct BridgeParameters {
   TrackingParameters tracking;
   SlipModel slip;       ///< for odometry
   SensorErrors errors;  ///< of what odometry is made from
+  can::Profile can;     ///< of its bus, for whoever makes that
 };
 
 /// Throws config::ConfigError naming file, key, unit and range.

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "tunnel_pilot/can/frame.h"
+#include "tunnel_pilot/geometry/time.h"
 
 namespace tunnel_pilot::can {
 
@@ -16,6 +17,10 @@ enum class BusState { kActive, kWarning, kPassive, kBusOff, kDown };
 class Bus {
  public:
   virtual ~Bus() = default;
+
+  /// Time goes on, told each time before the bus is read. Only a bus that has deadlines of its own
+  /// listens.
+  virtual void tick(Stamp /*now*/) {}
 
   /// False when the frame was not taken (queue full, link down): it is dropped, never sent late.
   virtual bool send(const Frame& frame) = 0;

@@ -11,11 +11,15 @@
 
 namespace tunnel_pilot::can {
 
-/// An identifier to listen to.
+/// An identifier to listen to, or all that agree with it in the bits of a mask.
 struct Identifier {
-  std::uint32_t id = 0;   ///< 11 or 29 bits, without flags
-  bool extended = false;  ///< 29-bit identifier
+  std::uint32_t id = 0;             ///< 11 or 29 bits, without flags
+  bool extended = false;            ///< 29-bit identifier
+  std::uint32_t mask = 0x1FFFFFFF;  ///< bits that count; of 11-bit identifiers always all
 };
+
+/// True when a frame's identifier is one of those.
+bool matches(const Identifier& identifier, const Frame& frame);
 
 /// A CAN interface as rtnetlink tells of it.
 struct CanLink {

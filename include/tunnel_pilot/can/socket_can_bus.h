@@ -58,7 +58,7 @@ class SocketCanBus : public Bus {
   bool usable() const;
 
   std::string interface_;
-  std::vector<Identifier> listen_;  ///< sorted
+  std::vector<Identifier> listen_;
   std::unique_ptr<CanSocket> socket_;
   CanLink link_;
   bool open_ = false;

@@ -22,6 +22,7 @@ class BusTap : public can::Bus {
   BusTap(std::unique_ptr<can::Bus> bus, std::uint32_t counted)
       : bus_(std::move(bus)), counted_(counted) {}
 
+  void tick(Stamp now) override { bus_->tick(now); }
   bool send(const can::Frame& frame) override { return bus_->send(frame); }
   std::optional<can::Frame> receive() override;
   std::uint64_t confirmed() const override { return bus_->confirmed(); }

@@ -49,7 +49,8 @@ class Pace {
 /// the pilot answers.
 ///
 /// Parameters: config/simulator.yaml, and `truck_file`, `truck_controller_file`, `world_file` (paths),
-/// `bus` (name of the embedded bus), `load` (empty, loaded), `seed`, `reversed` (true: the other way
+/// `bus` (name of the embedded bus), `profile` (of the bus, may be left out: then truck_controller_file
+/// says it), `load` (empty, loaded), `seed`, `reversed` (true: the other way
 /// round), `real_time_factor`. Throws config::ConfigError.
 class SimulatorRos {
  public:

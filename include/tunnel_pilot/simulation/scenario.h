@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "tunnel_pilot/can/profile.h"
 #include "tunnel_pilot/config/node.h"
 #include "tunnel_pilot/drivers/preview_parameters.h"
 #include "tunnel_pilot/geometry/path.h"
@@ -93,6 +94,7 @@ struct Scenario {
   std::string file;                                ///< it was read from
   std::string config_folder;                       ///< the rooms' YAML files
   std::optional<drivers::PreviewLaw> preview_law;  ///< none: what preview_driver.yaml says
+  std::optional<can::ProfileKind> profile;         ///< of the bus; none: what the sides' files say
   std::uint64_t first_seed;
   int seeds;
   PlantChoice plant;

@@ -7,6 +7,7 @@
 
 #include "tunnel_pilot/can/bus.h"
 #include "tunnel_pilot/can/codec.h"
+#include "tunnel_pilot/can/profile.h"
 #include "tunnel_pilot/can/protection.h"
 #include "tunnel_pilot/config/node.h"
 #include "tunnel_pilot/geometry/time.h"
@@ -31,6 +32,7 @@ struct TruckControllerParameters {
   double override_brake;        ///< pedal that takes over [1]
   double wheel_ratio;           ///< articulation over wheel turn, when the operator steers [1]
   double full_brake_pressure;   ///< at service_deceleration [Pa]
+  can::Profile can;             ///< of its bus, for whoever makes that
 };
 
 /// Throws config::ConfigError naming file, key, unit and range.
