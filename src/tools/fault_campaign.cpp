@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "tunnel_pilot/bridge/can_bridge.h"
+#include "tunnel_pilot/bridge/heartbeat_watch.h"
 #include "tunnel_pilot/can/log_writer.h"
 #include "tunnel_pilot/can/memory_bus.h"
 #include "tunnel_pilot/can/profile.h"
@@ -29,6 +30,7 @@ using bridge::SafetyState;
 
 constexpr double kDeg = 3.14159265358979323846 / 180.0;
 constexpr Stamp kCycle = std::chrono::milliseconds(20);
+constexpr const char* kProcess = "/arbiter";
 
 struct Setup {
   bridge::BridgeParameters bridge;
@@ -73,6 +75,7 @@ struct Faults {
   bool counter_stands = false;
   bool truck_deaf = false;  ///< loses every other frame of the pilot's
   bool degraded = false;    ///< the arbiter tells bad health
+  bool process_silent = false;
 };
 
 /// Bridge and truck, and between them a wire that a log is kept of. Time is the bus's own; the bridge's
@@ -89,6 +92,7 @@ class Rig {
         truck_bus_(can::withProfile(setup.controller.can, truck_side_.connect())),
         wire_to_truck_(truck_side_.connect()),
         bridge_(setup.bridge, setup.truck.geometry, *bridge_bus_),
+        heartbeats_({kProcess}, setup.bridge.heartbeat_timeout),
         controller_(setup.controller, *truck_bus_),
         plant_(setup.truck),
         next_tick_(start),
@@ -108,9 +112,11 @@ class Rig {
     if (now_ >= next_command_) {
       next_command_ = now_ + kCycle;
       sendCommand();
+      beat();
     }
     if (now_ < next_tick_) return;
     next_tick_ = now_ + tick_period_;
+    bridge_.setSilentProcess(heartbeats_.silent(now_));
     bridge_.tick(clock());
     carry();
   }
@@ -175,7 +181,7 @@ class Rig {
   Faults faults;
   supervision::Command command_;
   simulation::OperatorInputs cab;
-  Stamp last_good_feedback{}, last_command{}, last_measurement{};  ///< bus time
+  Stamp last_good_feedback{}, last_command{}, last_measurement{}, last_heartbeat{};  ///< bus time
 
  private:
   Stamp clock() const { return now_ + offset_; }
@@ -221,6 +227,12 @@ class Rig {
         faults.commands_count_back || faults.commands_not_finite || faults.commands_out_of_range;
     if (!bad) last_command = now_;
     carry();
+  }
+
+  void beat() {
+    if (faults.process_silent) return;
+    last_heartbeat = now_;
+    heartbeats_.heard(kProcess, now_);
   }
 
   void carry() {
@@ -275,6 +287,7 @@ class Rig {
   can::Profile profile_;
   std::unique_ptr<can::Bus> bridge_bus_, wire_to_bridge_, truck_bus_, wire_to_truck_;
   bridge::CanBridge bridge_;
+  bridge::HeartbeatWatch heartbeats_;
   simulation::TruckController controller_;
   vehicle::KinematicTruck plant_;
   Stamp next_tick_, next_command_;
@@ -338,7 +351,7 @@ class Episode {
     if (!chance(0.25)) return;
     disturbed_ = true;
     quiet_at_ = rig_.now() + fromSeconds(0.02 + uniform() * uniform() * 1.5);
-    switch (below(17)) {
+    switch (below(18)) {
       case 0:
         faults.commands_lost = true;
         break;
@@ -386,6 +399,9 @@ class Episode {
         break;
       case 15:
         rig_.jumpClock(fromSeconds((uniform() - 0.5) * 4.0));
+        break;
+      case 16:
+        faults.process_silent = true;
         break;
       default:
         foreign();
@@ -484,6 +500,8 @@ std::vector<Row> rows() {
       {"A1 commands lost", [](Rig& rig) { rig.faults.commands_lost = true; }, command, 100, true},
       {"A1 measurement frozen", [](Rig& rig) { rig.faults.measurement_frozen = true; },
        [](const Rig& rig) { return rig.last_measurement; }, 300, true},
+      {"D1 heartbeats of a process lost", [](Rig& rig) { rig.faults.process_silent = true; },
+       [](const Rig& rig) { return rig.last_heartbeat; }, 60, true},
       {"A2 operator's stop", [](Rig& rig) { rig.stop(); }, at_once, 20, false},
       {"A2 operator's release", [](Rig& rig) { rig.release(); }, at_once, 20, false, false},
       {"A2 arbiter's stop (its period of 20 ms included)",
