@@ -32,6 +32,7 @@ constexpr double kSteps = 100.0;                        // of a bar's length, th
 constexpr std::size_t kHashDigits = 12;
 
 const Text kNoData{"no data", Tone::kStale};
+const Text kNoCommand{"no command", Tone::kStale};
 
 template <class... Numbers>
 std::string format(const char* pattern, Numbers... numbers) {
@@ -128,7 +129,8 @@ void addSpeed(const HudInput& input, const Moment& now, HudContent& out) {
   const auto motion = input.odometry.measured(now);
   const auto command = input.command.spoken(now);
   const auto arbiter = input.arbiter.spoken(now);
-  out.speed = out.asked_speed = kNoData;
+  out.speed = kNoData;
+  out.asked_speed = kNoCommand;
   if (motion != Freshness::kLost) {
     const double speed = input.odometry.message().twist.twist.linear.x;
     out.speed = told(motion, {number("%.2f m/s", speed, 100.0), Tone::kNormal});
@@ -158,7 +160,8 @@ std::optional<double> articulationOf(const sensor_msgs::JointState& joints) {
 void addArticulation(const HudInput& input, const Moment& now, HudContent& out) {
   const auto motion = input.joints.measured(now);
   const auto command = input.command.spoken(now);
-  out.articulation = out.commanded = kNoData;
+  out.articulation = kNoData;
+  out.commanded = kNoCommand;
   if (motion != Freshness::kLost) {
     if (const auto angle = articulationOf(input.joints.message())) {
       out.articulation = told(motion, {degrees(*angle), Tone::kNormal});
@@ -214,7 +217,7 @@ std::optional<double> amongOutputs(double angle, const Proposal& network) {
 
 void addNetwork(const HudInput& input, const Moment& now, HudContent& out) {
   const auto measured = input.network.measured(now);
-  out.network_angle = out.confidence = kNoData;
+  out.network_angle = kNoData;
   if (measured == Freshness::kLost) return;
   const Proposal& network = input.network.message();
   addOutputs(network, out);
@@ -226,7 +229,6 @@ void addNetwork(const HudInput& input, const Moment& now, HudContent& out) {
   }
   if (!network.valid) {
     out.network_angle = told(measured, {"no proposal", Tone::kCaution});
-    out.confidence.text.clear();
     return;
   }
   out.network_angle = told(measured, {degrees(network.articulation_angle), Tone::kNormal});

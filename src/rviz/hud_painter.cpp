@@ -122,7 +122,7 @@ class ColumnPainter {
     for (std::size_t i = 0; i < outputs.size(); ++i) {
       const double bar = std::max(1.0, outputs[i] * height);
       const double left = column_.left + column_.width - (static_cast<double>(i) + 1.0) * step;
-      painter_.fillRect(QRectF(left, top + height - bar, step - 1.5, bar), color(gauge.tone));
+      painter_.fillRect(QRectF(left, top + height - bar, step - 0.8, bar), color(gauge.tone));
     }
     const auto inChart = [&](double value) {
       return column_.left + column_.width - 0.5 * step - 0.5 * (value + 1.0) * (column_.width - step);
@@ -135,13 +135,14 @@ class ColumnPainter {
   void write(const Text& text, int baseline, const QFont& f) {
     write(QString::fromStdString(text.text), baseline, f, color(text.tone));
   }
+  // What is too wide is written smaller, then cut.
   void write(const QString& text, int baseline, const QFont& f, const QColor& c) {
     painter_.setFont(f);
     painter_.setPen(c);
+    if (painter_.fontMetrics().horizontalAdvance(text) > column_.width) painter_.setFont(font(kTitle));
     const QString shown = painter_.fontMetrics().elidedText(text, Qt::ElideRight, column_.width);
     painter_.drawText(column_.left, baseline, shown);
   }
-
   void writeRight(const Text& text, int baseline, const QFont& f) {
     const QString words = QString::fromStdString(text.text);
     painter_.setFont(f);
