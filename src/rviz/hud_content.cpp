@@ -171,7 +171,7 @@ void addArticulation(const HudInput& input, const Moment& now, HudContent& out) 
   }
   if (command == Freshness::kLost) return;
   const double angle = input.command.message().articulation_angle;
-  out.commanded = told(command, {"command " + degrees(angle), Tone::kNormal});
+  out.commanded = told(command, {"asked " + degrees(angle), Tone::kNormal});
   out.articulation_gauge.mark = share(angle, kArticulationScale);
 }
 
@@ -181,9 +181,8 @@ void addTunnel(const HudInput& input, const Moment& now, HudContent& out) {
   if (measured == Freshness::kLost) return;
   const TunnelState& tunnel = input.tunnel.message();
   if (!tunnel.valid) {
-    out.lateral = told(measured, {"no tunnel", Tone::kCaution});
-    out.heading =
-        told(measured, {toString(static_cast<perception::TunnelReason>(tunnel.reason)), Tone::kCaution});
+    const std::string why = toString(static_cast<perception::TunnelReason>(tunnel.reason));
+    out.no_tunnel = told(measured, {"no tunnel: " + why, Tone::kCaution});
     return;
   }
   out.lateral = told(measured, {number("%+.2f m", tunnel.lateral_offset, 100.0), Tone::kNormal});
@@ -241,7 +240,7 @@ Text ageInWords(const Heard<Message>& heard, const Moment& now) {
   if (!heard.any()) return kNoData;
   const double steady = heard.steadySilence(now);
   const double age = heard.age(now);
-  if (age < -kFuture) return {format("%.1f s ahead", -age), Tone::kAlarm};
+  if (age < -kFuture) return {format("%.1f s", age), Tone::kAlarm};  // the clocks do not agree
   // Where time stands still, nothing ages by it.
   const double older = steady > kAgedAfterSteady ? std::max(steady, age) : age;
   const Tone tone = older > kTooLate ? Tone::kAlarm : older > kLate ? Tone::kCaution : Tone::kNormal;
@@ -251,8 +250,8 @@ Text ageInWords(const Heard<Message>& heard, const Moment& now) {
 
 auto texts(const HudContent& c) {
   return std::tie(c.state, c.mode, c.reason, c.source, c.speed, c.asked_speed, c.limited_by,
-                  c.speed_limit, c.articulation, c.commanded, c.lateral, c.heading, c.network_angle,
-                  c.confidence, c.model, c.hash, c.scan_age, c.feedback_age);
+                  c.speed_limit, c.articulation, c.commanded, c.lateral, c.heading, c.no_tunnel,
+                  c.network_angle, c.confidence, c.model, c.hash, c.scan_age, c.feedback_age);
 }
 
 auto gauges(const HudContent& c) {

@@ -72,14 +72,14 @@ class ColumnPainter {
   void title(const char* words, int baseline = kTitleLine) {
     write(QString::fromLatin1(words), baseline, font(kTitle), kTitleColor);
   }
-  void besideTitle(const Text& text) { writeRight(text, kTitleLine, font(kTitle)); }
+  void besideTitle(const Text& text) { writeRight(text, kTitleLine, font(kTitle), column_.width / 2); }
   void line(const Text& text, int baseline) { write(text, baseline, font(kSmall)); }
   void large(const Text& text) { write(text, kLargeLine, font(kLarge, true)); }
 
   /// A word before a value, at the column's edges.
   void pair(const char* name, const Text& value, int baseline) {
     write(QString::fromLatin1(name), baseline, font(kSmall), kTitleColor);
-    writeRight(value, baseline, font(kSmall));
+    writeRight(value, baseline, font(kSmall), 2 * column_.width / 3);
   }
 
   /// From the left edge.
@@ -104,14 +104,14 @@ class ColumnPainter {
     painter_.fillRect(box, color(state.tone));
     painter_.setPen(kBadgeLetters);
     painter_.drawText(box, Qt::AlignCenter, text);
-    writeRight(mode, 31, font(kSmall));
+    writeRight(mode, 31, font(kSmall), column_.width - box.width() - 6);
   }
 
-  /// In up to two lines.
-  void wrapped(const Text& text, int top) {
-    painter_.setFont(font(kReason, true));
+  /// In as many lines as there is room for.
+  void wrapped(const Text& text, int top, const QFont& f) {
+    painter_.setFont(f);
     painter_.setPen(color(text.tone));
-    painter_.drawText(QRect(column_.left, top, column_.width, 40), Qt::TextWordWrap,
+    painter_.drawText(QRect(column_.left, top, column_.width, kHeight - top), Qt::TextWordWrap,
                       QString::fromStdString(text.text));
   }
 
@@ -135,20 +135,25 @@ class ColumnPainter {
   void write(const Text& text, int baseline, const QFont& f) {
     write(QString::fromStdString(text.text), baseline, f, color(text.tone));
   }
-  // What is too wide is written smaller, then cut.
-  void write(const QString& text, int baseline, const QFont& f, const QColor& c) {
+  // What is too wide for its room is written smaller, then cut.
+  QString fitted(const QString& text, QFont f, int room) {
     painter_.setFont(f);
+    while (f.pixelSize() > kTitle && painter_.fontMetrics().horizontalAdvance(text) > room) {
+      f.setPixelSize(f.pixelSize() - 1);
+      painter_.setFont(f);
+    }
+    return painter_.fontMetrics().elidedText(text, Qt::ElideRight, room);
+  }
+  void write(const QString& text, int baseline, const QFont& f, const QColor& c) {
+    const QString shown = fitted(text, f, column_.width);
     painter_.setPen(c);
-    if (painter_.fontMetrics().horizontalAdvance(text) > column_.width) painter_.setFont(font(kTitle));
-    const QString shown = painter_.fontMetrics().elidedText(text, Qt::ElideRight, column_.width);
     painter_.drawText(column_.left, baseline, shown);
   }
-  void writeRight(const Text& text, int baseline, const QFont& f) {
-    const QString words = QString::fromStdString(text.text);
-    painter_.setFont(f);
+  void writeRight(const Text& text, int baseline, const QFont& f, int room) {
+    const QString shown = fitted(QString::fromStdString(text.text), f, room);
     painter_.setPen(color(text.tone));
-    const int width = painter_.fontMetrics().horizontalAdvance(words);
-    painter_.drawText(column_.left + column_.width - width, baseline, words);
+    const int width = painter_.fontMetrics().horizontalAdvance(shown);
+    painter_.drawText(column_.left + column_.width - width, baseline, shown);
   }
 
   int at(double share) const {
@@ -173,7 +178,7 @@ class ColumnPainter {
 void paintState(const HudContent& content, QPainter& painter) {
   ColumnPainter column(painter, kStateColumn);
   column.badge(content.state, content.mode);
-  column.wrapped(content.reason, 46);
+  column.wrapped(content.reason, 46, font(kReason, true));
   column.pair("steered by", content.source, kLast);
 }
 
@@ -198,6 +203,10 @@ void paintArticulation(const HudContent& content, QPainter& painter) {
 void paintTunnel(const HudContent& content, QPainter& painter) {
   ColumnPainter column(painter, kTunnelColumn);
   column.title("IN THE TUNNEL");
+  if (!content.no_tunnel.text.empty()) {
+    column.wrapped(content.no_tunnel, 34, font(kSmall));
+    return;
+  }
   column.pair("offset", content.lateral, 46);
   column.signedBar(content.lateral_gauge, kUpperBar);
   column.pair("heading", content.heading, kLast - 15);

@@ -185,7 +185,7 @@ TEST(HudSpeed, ThatIsNoNumberHasNoBar) {
 
 TEST(HudArticulation, IsMeasuredBesideItsCommand) {
   expectText("+10.0°", Tone::kNormal, driving().articulation);
-  expectText("command +12.0°", Tone::kNormal, driving().commanded);
+  expectText("asked +12.0°", Tone::kNormal, driving().commanded);
   EXPECT_DOUBLE_EQ(0.22, driving().articulation_gauge.value.value());
   EXPECT_DOUBLE_EQ(0.27, driving().articulation_gauge.mark.value());
 }
@@ -200,6 +200,7 @@ TEST(HudArticulation, OfOtherJointsIsNoData) {
 }
 
 TEST(HudTunnel, TellsOffsetAndHeadingInTheirScales) {
+  EXPECT_EQ("", driving().no_tunnel.text);
   expectText("+0.25 m", Tone::kNormal, driving().lateral);
   expectText("-5.0°", Tone::kNormal, driving().heading);
   EXPECT_DOUBLE_EQ(0.25, driving().lateral_gauge.value.value());
@@ -213,8 +214,7 @@ TEST(HudTunnel, ThatIsNotValidShowsNoNumbers) {
   none.reason = TunnelState::REASON_NO_WALLS;
   hear(none, input.tunnel);
   const auto content = describeHud(input, after(0.0));
-  expectText("no tunnel", Tone::kCaution, content.lateral);
-  expectText("no walls found", Tone::kCaution, content.heading);
+  expectText("no tunnel: no walls found", Tone::kCaution, content.no_tunnel);
   EXPECT_FALSE(content.lateral_gauge.value.has_value());
 }
 
@@ -298,7 +298,7 @@ TEST(HudAge, OfADecisionIsOfItsArrival) {
 
 TEST(HudAge, OfAClockThatWentBackIsNotTrusted) {
   EXPECT_EQ("no data", describeHud(drivingInput(), after(-1.0)).speed.text);
-  expectText("1.0 s ahead", Tone::kAlarm, describeHud(drivingInput(), after(-1.0)).scan_age);
+  expectText("-1.0 s", Tone::kAlarm, describeHud(drivingInput(), after(-1.0)).scan_age);
 }
 
 TEST(HudAge, OfScanAndFeedbackIsToldInColour) {

@@ -91,8 +91,8 @@ struct HudContent {
   Text speed, asked_speed, limited_by, speed_limit;
   Gauge speed_gauge;  ///< mark: the speed asked for
   Text articulation, commanded;
-  Gauge articulation_gauge;  ///< mark: the command
-  Text lateral, heading;
+  Gauge articulation_gauge;          ///< mark: the command
+  Text lateral, heading, no_tunnel;  ///< no_tunnel: why there are no numbers, else empty
   Gauge lateral_gauge, heading_gauge;
   Text network_angle, confidence, model, hash;
   std::vector<double> outputs;  ///< 0 to 1, the first one's articulation rightmost
