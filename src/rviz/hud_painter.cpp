@@ -73,13 +73,16 @@ class ColumnPainter {
     write(QString::fromLatin1(words), baseline, font(kTitle), kTitleColor);
   }
   void besideTitle(const Text& text) { writeRight(text, kTitleLine, font(kTitle), column_.width / 2); }
+  void beside(const Text& text, int baseline) {
+    writeRight(text, baseline, font(kSmall), 2 * column_.width / 3);
+  }
   void line(const Text& text, int baseline) { write(text, baseline, font(kSmall)); }
   void large(const Text& text) { write(text, kLargeLine, font(kLarge, true)); }
 
   /// A word before a value, at the column's edges.
   void pair(const char* name, const Text& value, int baseline) {
     write(QString::fromLatin1(name), baseline, font(kSmall), kTitleColor);
-    writeRight(value, baseline, font(kSmall), 2 * column_.width / 3);
+    beside(value, baseline);
   }
 
   /// From the left edge.
@@ -97,14 +100,13 @@ class ColumnPainter {
     if (gauge.mark) mark(0.5 - 0.5 * *gauge.mark, top);
   }
 
-  void badge(const Text& state, const Text& mode) {
+  void badge(const Text& state) {
     painter_.setFont(font(kBadge, true));
     const QString text = QString::fromStdString(state.text);
     const QRect box(column_.left, 12, painter_.fontMetrics().horizontalAdvance(text) + 22, 28);
     painter_.fillRect(box, color(state.tone));
     painter_.setPen(kBadgeLetters);
     painter_.drawText(box, Qt::AlignCenter, text);
-    writeRight(mode, 31, font(kSmall), column_.width - box.width() - 6);
   }
 
   /// In as many lines as there is room for.
@@ -177,9 +179,11 @@ class ColumnPainter {
 
 void paintState(const HudContent& content, QPainter& painter) {
   ColumnPainter column(painter, kStateColumn);
-  column.badge(content.state, content.mode);
+  column.badge(content.state);
   column.wrapped(content.reason, 46, font(kReason, true));
-  column.pair("steered by", content.source, kLast);
+  const bool has_mode = !content.mode.text.empty();
+  column.line(has_mode ? content.mode : Text{"steered by", Tone::kStale}, kLast);
+  column.beside(content.source, kLast);
 }
 
 void paintSpeed(const HudContent& content, QPainter& painter) {
