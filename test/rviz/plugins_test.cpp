@@ -9,11 +9,12 @@
 #include <rviz/visualization_frame.h>
 #include <rviz/visualization_manager.h>
 #include <rviz/yaml_config_reader.h>
+#include <sensor_msgs/LaserScan.h>
 #include <std_srvs/Trigger.h>
 
 #include <QApplication>
 #include <QDir>
-#include <QFile>
+#include <QFileInfo>
 #include <QImage>
 #include <QLabel>
 #include <QLineEdit>
@@ -164,43 +165,48 @@ TEST_F(PanelTest, KeepsFolderAndTopicsInTheConfiguration) {
 
 class RecorderTest : public PanelTest {
  protected:
-  RecorderTest() : odometry_(node_.advertise<nav_msgs::Odometry>("odom", 10)) {
-    panel_.findChild<QLineEdit*>("folder")->setText(folder_.path() + "/bags");
+  RecorderTest() : scans_(node_.advertise<sensor_msgs::LaserScan>("scan", 10)) {
+    panel_.findChild<QLineEdit*>("folder")->setText(path());
   }
 
-  QStringList bags() { return QDir(folder_.path() + "/bags").entryList(QDir::Files); }
-  bool publishedToRecorder() {
-    if (!waitUntil([&] { return odometry_.getNumSubscribers() > 0; })) return false;
-    odometry_.publish(nav_msgs::Odometry());
-    return true;
+  QString path() { return folder_.path() + "/bags"; }
+  QFileInfoList bags() { return QDir(path()).entryInfoList(QDir::Files); }
+
+  // Sends one message, larger than the recorder's chunks, and waits until it is on the disk.
+  bool recordsOneScan() {
+    constexpr int kChunk = 768 * 1024;
+    if (!waitUntil([&] { return scans_.getNumSubscribers() > 0; })) return false;
+    sensor_msgs::LaserScan scan;
+    scan.ranges.resize(2 * kChunk / sizeof(float));
+    scans_.publish(scan);
+    return waitUntil([&] { return !bags().empty() && bags().first().size() > kChunk; });
   }
 
   QTemporaryDir folder_;
   ros::NodeHandle node_;
-  ros::Publisher odometry_;
+  ros::Publisher scans_;
 };
 
 TEST_F(RecorderTest, RecordsIntoABagThatIsClosedAndTold) {
   click("record");
-  EXPECT_TRUE(says("recording", "recording " + folder_.path().toStdString()));
-  ASSERT_TRUE(publishedToRecorder());
-  QTest::qWait(500);  // until the recorder has it
+  EXPECT_TRUE(says("recording", "recording " + path().toStdString()));
+  ASSERT_TRUE(recordsOneScan());
   click("record");
   ASSERT_TRUE(says("recording", " MB)")) << text("recording");
   ASSERT_EQ(1, bags().size());
-  const rosbag::Bag bag((folder_.path() + "/bags/" + bags()[0]).toStdString());
-  EXPECT_EQ(1u, rosbag::View(bag, rosbag::TopicQuery("/odom")).size());
+  const rosbag::Bag bag(bags().first().filePath().toStdString());
+  EXPECT_EQ(1u, rosbag::View(bag, rosbag::TopicQuery("/scan")).size());
 }
 
 TEST_F(RecorderTest, ClosesTheBagWhenThePanelGoes) {
   {
     Panel panel;
-    panel.findChild<QLineEdit*>("folder")->setText(folder_.path() + "/bags");
+    panel.findChild<QLineEdit*>("folder")->setText(path());
     QTest::mouseClick(panel.findChild<QPushButton*>("record"), Qt::LeftButton);
-    ASSERT_TRUE(publishedToRecorder());
+    ASSERT_TRUE(recordsOneScan());
   }
   ASSERT_EQ(1, bags().size());
-  EXPECT_TRUE(bags()[0].endsWith(".bag")) << bags()[0].toStdString();
+  EXPECT_EQ("bag", bags().first().suffix().toStdString());
 }
 
 TEST_F(RecorderTest, TellsThatItCannotRecord) {
