@@ -23,11 +23,6 @@ std::string format(const char* pattern, Numbers... numbers) {
 // To hundredths, and never to "-0.00".
 double rounded(double value) { return std::round(100.0 * value) / 100.0 + 0.0; }
 
-std::string words(std::string name) {
-  std::replace(name.begin(), name.end(), '_', ' ');
-  return name;
-}
-
 void add(const std::string& line, StatusText& out) {
   if (!out.text.empty()) out.text += '\n';
   out.text += line;
@@ -35,12 +30,6 @@ void add(const std::string& line, StatusText& out) {
 
 bool isStopped(const StatusInput& input) {
   return input.truck && bridge::isStop(static_cast<bridge::SafetyState>(input.truck->state));
-}
-
-// The bridge's reason counts once it stops the truck; else the arbiter's.
-std::string reason(const StatusInput& input) {
-  const bool bridges = input.truck && (isStopped(input) || !input.arbiter);
-  return bridges ? input.truck->reason_text : input.arbiter ? input.arbiter->reason_text : "";
 }
 
 void addState(const StatusInput& input, StatusText& out) {
@@ -54,7 +43,7 @@ void addState(const StatusInput& input, StatusText& out) {
   } else if (!mode.empty()) {
     add(mode, out);
   }
-  if (const auto why = reason(input); !why.empty()) add(why, out);
+  if (const auto why = reasonInWords(input); !why.empty()) add(why, out);
 }
 
 void addDrive(const StatusInput& input, StatusText& out) {
@@ -97,6 +86,18 @@ void addTunnel(const TunnelState& tunnel, StatusText& out) {
   add(shape, out);
 }
 
+}  // namespace
+
+std::string words(std::string name) {
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name;
+}
+
+std::string reasonInWords(const StatusInput& input) {
+  const bool bridges = input.truck && (isStopped(input) || !input.arbiter);
+  return bridges ? input.truck->reason_text : input.arbiter ? input.arbiter->reason_text : "";
+}
+
 Gravity gravity(const StatusInput& input) {
   using bridge::SafetyState;
   if (isStopped(input)) return Gravity::kStopped;
@@ -107,8 +108,6 @@ Gravity gravity(const StatusInput& input) {
   const bool lost = !input.arbiter && input.tunnel && !input.tunnel->valid;
   return limited || lost || state == SafetyState::kDegraded ? Gravity::kLimited : Gravity::kNormal;
 }
-
-}  // namespace
 
 StatusText describe(const StatusInput& input) {
   StatusText out;

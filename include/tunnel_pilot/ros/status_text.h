@@ -36,4 +36,11 @@ struct StatusInput {
 /// known.
 StatusText describe(const StatusInput& input);
 
+/// The one reason why the truck does what it does: the bridge's once it stops the truck, else the
+/// arbiter's. Empty when neither is known.
+std::string reasonInWords(const StatusInput& input);
+Gravity gravity(const StatusInput& input);
+/// "lidar_driver" as "lidar driver".
+std::string words(std::string name);
+
 }  // namespace tunnel_pilot::shell
