@@ -13,6 +13,7 @@
 #include "tunnel_pilot/config/node.h"
 #include "tunnel_pilot/drivers/lidar_driver.h"
 #include "tunnel_pilot/drivers/preview_parameters.h"
+#include "tunnel_pilot/drivers/step_driver.h"
 #include "tunnel_pilot/perception/centerline.h"
 #include "tunnel_pilot/perception/scan_filter.h"
 #include "tunnel_pilot/perception/wall_segmentation.h"
@@ -32,6 +33,7 @@ const std::vector<std::pair<std::string, std::function<void(const config::Node&)
     {"centerline", [](const config::Node& node) { perception::loadCenterline(node); }},
     {"lidar_driver", [](const config::Node& node) { drivers::loadLidarDriver(node, ""); }},
     {"preview_driver", [](const config::Node& node) { drivers::loadPreviewDriver(node, ""); }},
+    {"step_driver", [](const config::Node& node) { drivers::loadStepDriver(node); }},
     {"arbiter", [](const config::Node& node) { supervision::loadArbiter(node); }},
     {"can_bridge", [](const config::Node& node) { bridge::loadBridge(node); }},
     {"simulator", [](const config::Node& node) { simulation::loadSimulator(node); }},

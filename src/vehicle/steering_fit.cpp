@@ -28,9 +28,10 @@ constexpr double kLeastSweep = 30.0 * kDegree;
 constexpr double kSweepTurn = 2.0 * kDegree;  // by which a new sweep begins
 constexpr double kSweepSpread = 0.1;          // [1] of the sweeps to one side
 constexpr double kMostAngle = 90.0 * kDegree;
-constexpr double kUnlimited = 20.0;  // [rad/s] no limit
-constexpr double kStiff = 80.0;      // [rad/s] of a hinge that cannot be seen to give way
-constexpr double kBetter = 1.01;     // the squares' sum without a rate limit, if it is to be seen
+constexpr double kUnlimited = 20.0;     // [rad/s] no limit
+constexpr double kStiff = 80.0;         // [rad/s] of a hinge that cannot be seen to give way
+constexpr double kClearlySlower = 0.9;  // [1] than the command, for a limit to be the hydraulics'
+constexpr double kBetter = 1.01;        // the squares' sum without a rate limit, if it is to be seen
 
 enum Parameter { kDeadTime, kRate, kLag, kDeadBand, kBias, kFrequency, kDamping, kParameters };
 using Vector = Eigen::Matrix<double, kParameters, 1>;
@@ -146,13 +147,15 @@ struct Step {
   bool left;
 };
 
-std::vector<Step> stepsOf(const std::vector<TimedAngle>& commands) {
+// The steps, and the fastest of them [rad/s].
+std::vector<Step> stepsOf(const std::vector<TimedAngle>& commands, double& fastest) {
   std::vector<Step> steps;
   double going = 0.0;
   std::size_t first = 0;
   for (const TimedAngle& command : commands) {
     while (commands[first].time < command.time - kStepTime) ++first;
     const double change = command.angle - commands[first].angle;
+    fastest = std::max(fastest, std::abs(change) / kStepTime);
     if (std::abs(change) < 0.5 * kLeastStep) going = 0.0;
     if (std::abs(change) < kLeastStep || change * going > 0.0) continue;
     steps.push_back({commands[first].time, change > 0.0});
@@ -167,7 +170,7 @@ class Problem {
   Problem(const std::vector<SteeringRecord>& records, TurnDirection direction) : records_(records) {
     std::size_t cluster = 0;
     for (const SteeringRecord& record : records) {
-      const std::vector<Step> steps = stepsOf(record.commanded);
+      const std::vector<Step> steps = stepsOf(record.commanded, asked);
       for (const Step& step : steps) ++(step.left ? left : right);
       const double begin = record.measured.front().time;
       for (const TimedAngle& sample : record.measured) {
@@ -247,6 +250,7 @@ class Problem {
 
   std::size_t left = 0;
   std::size_t right = 0;
+  double asked = 0.0;  // the fastest that the command moves [rad/s]
 
  private:
   const std::vector<SteeringRecord>& records_;
@@ -328,15 +332,18 @@ void checkFollows(const Problem& problem, const Vector& best) {
   const Eigen::VectorXd measured = problem.residuals(still);
   const double likeness = correlation(measured, measured - problem.residuals(usual));
   if (likeness < -0.5) {
-    throw std::runtime_error("the articulation turns against its command: check the sensor's sign");
+    throw CannotTell("the articulation turns against its command: check the sensor's sign");
   }
   if (correlation(measured, measured - problem.residuals(best)) < 0.8) {
-    throw std::runtime_error("the measured articulation does not follow the command");
+    throw CannotTell("the measured articulation does not follow the command");
   }
 }
 
-// Without any limit the record would be explained worse.
+// A limit is seen where the command was clearly faster (the bridge's own limit and jitter make what is
+// sent a little slower than what is asked for), and where the record would be explained worse without
+// it.
 bool limitSeen(const Problem& problem, Vector p, Flags free) {
+  if (p[kRate] > kClearlySlower * problem.asked) return false;
   const double limited = problem.residuals(p).squaredNorm();
   p[kRate] = kUnlimited;
   free[kRate] = false;
@@ -414,13 +421,12 @@ void SteeringIdentification::add(const SteeringRecord& record) {
 
 SteeringFit SteeringIdentification::fit(TurnDirection direction) const {
   if (duration_ < kLeastRecord) {
-    throw std::runtime_error(
-        inWords("the record is too short: %.0f s of the pilot's steering, %.0f needed", duration_,
-                kLeastRecord));
+    throw CannotTell(inWords("the record is too short: %.0f s of the pilot's steering, %.0f needed",
+                             duration_, kLeastRecord));
   }
   const Problem all(records_, TurnDirection::kBoth);
   if (all.left < kLeastSteps || all.right < kLeastSteps) {
-    throw std::runtime_error(
+    throw CannotTell(
         inWords("the command moves too evenly to tell dead time from lag: %.0f steps to the left and "
                 "%.0f to the right",
                 static_cast<double>(all.left), static_cast<double>(all.right)));
@@ -450,9 +456,10 @@ SteeringFit SteeringIdentification::fit(TurnDirection direction) const {
   refuseIfVague(fit.dead_time, kVagueTime, "the steps are too few or too small to tell it");
   refuseIfVague(fit.lag, kVagueLag * fit.lag.value, "the steps are too few or too small to tell it");
   if (!limited) {
+    const double least = std::min(fit.fastest, p[kRate]);
     fit.rate = {0.0, 0.0,
-                inWords("the command was never out of the hydraulics' reach: at least %.1f deg/s",
-                        fit.fastest / kDegree)};
+                inWords("the command did not ask for more than the hydraulics give: at least %.1f deg/s",
+                        least / kDegree)};
   }
   refuseIfVague(fit.rate, kVagueRate * fit.rate.value,
                 "too few steps were large and fast enough to tell it");

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -42,6 +43,12 @@ struct SteeringFit {
   std::size_t samples = 0;       ///< measurements that were explained
 };
 
+/// A record cannot tell how the steering answers; what() says why.
+class CannotTell : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 /// Which movements a fit explains.
 enum class TurnDirection { kBoth, kLeft, kRight };
 
@@ -54,14 +61,15 @@ enum class TurnDirection { kBoth, kLeft, kRight };
 /// of parameters; the first 1.5 s of each only start the model. Deviations come from the sandwich
 /// estimator with clusters of 2 s (Liang & Zeger 1986): what the model leaves over is no white noise. A
 /// parameter whose deviation is too large to be of use (dead time 10 ms, rate 5 %, lag 6 %) is
-/// refused; so is a rate without which the record is explained as well.
+/// refused; so is a rate without which the record is explained as well, or
+/// one that is not clearly below what the command asked for.
 class SteeringIdentification {
  public:
   /// Takes a stretch. Times must grow. Throws std::invalid_argument for numbers that are not finite,
   /// times that do not grow, angles beyond 90 deg; a stretch of less than 3 s is left out.
   void add(const SteeringRecord& record);
 
-  /// Throws std::runtime_error with the reason when the record cannot tell how the steering answers: too
+  /// Throws CannotTell with the reason when the record cannot tell how the steering answers: too
   /// short, too few steps, an articulation that does not follow or turns the wrong way. kLeft and kRight
   /// explain only what follows the command's steps to that side, with the bias and dead band of both.
   SteeringFit fit(TurnDirection direction = TurnDirection::kBoth) const;
