@@ -226,10 +226,12 @@ cv::Mat Chart::draw(int width, int height) const {
   return image;
 }
 
-void writePng(const std::string& file, const std::vector<cv::Mat>& rows) {
+std::string toPng(const std::vector<cv::Mat>& rows) {
   cv::Mat image;
   cv::vconcat(rows, image);
-  if (!cv::imwrite(file, image)) throw std::runtime_error("cannot write '" + file + "'");
+  std::vector<unsigned char> bytes;
+  if (!cv::imencode(".png", image, bytes)) throw std::runtime_error("a picture could not be encoded");
+  return std::string(bytes.begin(), bytes.end());
 }
 
 }  // namespace tunnel_pilot::simulation

@@ -13,6 +13,7 @@ namespace tunnel_pilot::simulation {
 namespace {
 
 using geometry::Point;
+using Images = std::vector<cv::Mat>;
 using Value = std::function<double(const TrackSample&)>;
 
 constexpr double kDegrees = 57.29577951308232;
@@ -121,8 +122,8 @@ cv::Mat headingStrip(const std::vector<TrackSample>& track) {
       1.0);
 }
 
-void plotDrive(const std::string& file, const std::string& title, const EpisodeResult& episode,
-               const vehicle::TruckGeometry& truck) {
+Images driveImages(const std::string& title, const EpisodeResult& episode,
+                   const vehicle::TruckGeometry& truck) {
   const auto& track = episode.track;
   Chart speed("Speed", "distance along the line [m]", "speed [m/s]");
   speed.line(curve(track, station, [](const auto& s) { return s.speed; }), colour::kBlue, "", 1.6);
@@ -134,13 +135,16 @@ void plotDrive(const std::string& file, const std::string& title, const EpisodeR
   clearance.line({{track.front().station, 0.2}, {track.back().station, 0.2}}, colour::kRed,
                  "envelope margin 0.20 m", 1.2);
   clearance.includeY(0.0, 0.5);
-  writePng(file, {topView(episode, truck, title, true), offsetStrip(track), headingStrip(track),
-                  articulationStrip(track), speed.draw(kWidth, kStripHeight),
-                  clearance.draw(kWidth, kStripHeight)});
+  return {topView(episode, truck, title, true),
+          offsetStrip(track),
+          headingStrip(track),
+          articulationStrip(track),
+          speed.draw(kWidth, kStripHeight),
+          clearance.draw(kWidth, kStripHeight)};
 }
 
-void plotSteadyTurn(const std::string& file, const std::string& title, const EpisodeResult& episode,
-                    const vehicle::TruckGeometry& truck) {
+Images steadyTurnImages(const std::string& title, const EpisodeResult& episode,
+                        const vehicle::TruckGeometry& truck) {
   const auto& track = episode.track;
   const auto time = [](const TrackSample& s) { return s.time; };
   Chart yaw("Heading turned", "time [s]", "heading [deg]");
@@ -155,18 +159,18 @@ void plotSteadyTurn(const std::string& file, const std::string& title, const Epi
   acceleration.line(curve(track, time, [](const auto& s) { return s.lateral_acceleration; }),
                     colour::kBlue, "", 1.2);
   acceleration.includeY(0.0, 0.5);
-  writePng(file, {topView(episode, truck, title, false), yaw.draw(kWidth, 320),
-                  acceleration.draw(kWidth, kStripHeight)});
+  return {topView(episode, truck, title, false), yaw.draw(kWidth, 320),
+          acceleration.draw(kWidth, kStripHeight)};
 }
 
-void plotLaneChange(const std::string& file, const std::string& title, const EpisodeResult& episode,
-                    const vehicle::TruckGeometry& truck) {
-  writePng(file, {topView(episode, truck, title, false), offsetStrip(episode.track),
-                  headingStrip(episode.track), articulationStrip(episode.track)});
+Images laneChangeImages(const std::string& title, const EpisodeResult& episode,
+                        const vehicle::TruckGeometry& truck) {
+  return {topView(episode, truck, title, false), offsetStrip(episode.track), headingStrip(episode.track),
+          articulationStrip(episode.track)};
 }
 
-void plotPerception(const std::string& file, const std::string& title, const EpisodeResult& episode,
-                    const vehicle::TruckGeometry& truck) {
+Images perceptionImages(const std::string& title, const EpisodeResult& episode,
+                        const vehicle::TruckGeometry& truck) {
   const auto errors = [&](const std::string& name, const std::string& label, double factor,
                           double PerceptionSample::*member, double least_range) {
     Chart chart(name, "distance along the line [m]", label);
@@ -183,32 +187,30 @@ void plotPerception(const std::string& file, const std::string& title, const Epi
   std::vector<Point> curvature;
   for (const PerceptionSample& s : episode.perception) curvature.emplace_back(s.station, s.curvature);
   bend.line(std::move(curvature), colour::kOrange, "", 1.6);
-  writePng(file,
-           {topView(episode, truck, title, false), bend.draw(kWidth, kStripHeight),
-            errors("Heading: measured less true", "error [deg]", kDegrees,
-                   &PerceptionSample::heading_error, 2.0),
-            errors("Lateral offset: measured less true", "error [m]", 1.0,
-                   &PerceptionSample::offset_error, 0.05),
-            errors("Width: measured less true", "error [m]", 1.0, &PerceptionSample::width_error, 0.1)});
+  return {topView(episode, truck, title, false), bend.draw(kWidth, kStripHeight),
+          errors("Heading: measured less true", "error [deg]", kDegrees,
+                 &PerceptionSample::heading_error, 2.0),
+          errors("Lateral offset: measured less true", "error [m]", 1.0, &PerceptionSample::offset_error,
+                 0.05),
+          errors("Width: measured less true", "error [m]", 1.0, &PerceptionSample::width_error, 0.1)};
 }
 
 }  // namespace
 
-void plotEpisode(const std::string& file, const Scenario& scenario, const EpisodeResult& episode,
-                 const vehicle::TruckGeometry& truck) {
-  if (episode.track.empty()) return;
+std::string episodePicture(const Scenario& scenario, const EpisodeResult& episode,
+                           const vehicle::TruckGeometry& truck) {
+  if (episode.track.empty()) return "";
   const std::string title = scenario.name + ", " + episode.label();
-  if (std::holds_alternative<DriveExperiment>(scenario.experiment))
-    plotDrive(file, title, episode, truck);
-  if (std::holds_alternative<SteadyTurnExperiment>(scenario.experiment)) {
-    plotSteadyTurn(file, title, episode, truck);
-  }
-  if (std::holds_alternative<LaneChangeExperiment>(scenario.experiment)) {
-    plotLaneChange(file, title, episode, truck);
-  }
-  if (std::holds_alternative<PerceptionExperiment>(scenario.experiment)) {
-    plotPerception(file, title, episode, truck);
-  }
+  const auto images = [&]() -> Images {
+    if (std::holds_alternative<DriveExperiment>(scenario.experiment))
+      return driveImages(title, episode, truck);
+    if (std::holds_alternative<SteadyTurnExperiment>(scenario.experiment))
+      return steadyTurnImages(title, episode, truck);
+    if (std::holds_alternative<LaneChangeExperiment>(scenario.experiment))
+      return laneChangeImages(title, episode, truck);
+    return perceptionImages(title, episode, truck);
+  };
+  return toPng(images());
 }
 
 }  // namespace tunnel_pilot::simulation

@@ -6,8 +6,9 @@
 
 namespace tunnel_pilot::simulation {
 
-/// Writes the picture of one episode: what happened seen from above, and the errors over the way.
-void plotEpisode(const std::string& file, const Scenario& scenario, const EpisodeResult& episode,
-                 const vehicle::TruckGeometry& truck);
+/// The picture of one episode as a PNG: what happened seen from above, and the errors over the way.
+/// Empty for an episode without a track.
+std::string episodePicture(const Scenario& scenario, const EpisodeResult& episode,
+                           const vehicle::TruckGeometry& truck);
 
 }  // namespace tunnel_pilot::simulation

@@ -15,47 +15,13 @@
 #include <stdexcept>
 
 #include "episode_plots.h"
+#include "html_report.h"
+#include "report_text.h"
 
 namespace tunnel_pilot::simulation {
 namespace {
 
 using nlohmann::ordered_json;
-
-double metricOf(const EpisodeResult& episode, const std::string& key) {
-  const auto found = episode.metrics.find(key);
-  return found == episode.metrics.end() ? std::numeric_limits<double>::quiet_NaN() : found->second;
-}
-
-// As shown to people: in the metric's own unit, with three to four digits.
-std::string shown(const std::string& key, double value) {
-  if (std::isnan(value)) return "none";
-  if (std::isinf(value)) return "never";
-  char text[32];
-  const double scaled = value * metricText(key).factor;
-  const double magnitude = std::abs(scaled);
-  const bool whole = std::abs(scaled - std::round(scaled)) < 1e-9 && magnitude < 1e6;
-  const int decimals = whole               ? 0
-                       : magnitude >= 1000 ? 0
-                       : magnitude >= 100  ? 1
-                       : magnitude >= 10   ? 2
-                                           : 3;
-  std::snprintf(text, sizeof text, "%.*f", decimals, scaled);
-  return text;
-}
-
-std::string shownGoal(const Goal& goal) {
-  std::string text;
-  if (goal.min && goal.max) {
-    text = shown(goal.metric, *goal.min) + " .. " + shown(goal.metric, *goal.max);
-  } else if (goal.max) {
-    text = "<= " + shown(goal.metric, *goal.max);
-  } else if (goal.min) {
-    text = ">= " + shown(goal.metric, *goal.min);
-  } else {
-    return "report";
-  }
-  return goal.judge == Judge::kMedian ? text + " (median)" : text;
-}
 
 GoalResult judgeGoal(const Goal& goal, const std::vector<EpisodeResult>& episodes) {
   GoalResult result;
@@ -121,14 +87,6 @@ void writePerception(const std::filesystem::path& folder, const EpisodeResult& e
     writeRow(out, {toSeconds(s.stamp), s.station, s.curvature, s.valid ? 1.0 : 0.0, s.offset_error,
                    s.heading_error, s.width_error, s.curvature_error});
   }
-}
-
-std::set<std::string> metricKeys(const std::vector<EpisodeResult>& episodes) {
-  std::set<std::string> keys;
-  for (const EpisodeResult& episode : episodes) {
-    for (const auto& [key, value] : episode.metrics) keys.insert(key);
-  }
-  return keys;
 }
 
 void writeEpisodes(const std::filesystem::path& folder, const std::vector<EpisodeResult>& episodes) {
@@ -233,13 +191,9 @@ std::string table(const Scenario& scenario, const Evaluation& evaluation) {
   std::vector<std::vector<std::string>> rows = {
       {"metric", "paper", "goal", "median", "worst", "verdict"}};
   for (const GoalResult& result : evaluation.goals) {
-    const MetricText& text = metricText(result.goal.metric);
-    rows.push_back({text.words + (text.unit.empty() ? "" : " [" + text.unit + "]"), result.goal.paper,
-                    shownGoal(result.goal), shown(text.key, result.median),
-                    shown(text.key, result.worst),
-                    result.goal.judge == Judge::kReportOnly ? "-"
-                    : result.holds                          ? "ok"
-                                                            : "MISSED"});
+    const std::string& key = result.goal.metric;
+    rows.push_back({shownName(key), result.goal.paper, shownGoal(result.goal), shown(key, result.median),
+                    shown(key, result.worst), shownVerdict(result)});
   }
   std::vector<std::size_t> widths(rows.front().size(), 0);
   for (const auto& row : rows) {
@@ -278,9 +232,13 @@ void writeReport(const std::string& folder, const Scenario& scenario, const Eval
     writeTrack(path, episode);
     writePerception(path, episode);
   }
+  std::vector<Picture> pictures;
   for (const EpisodeResult* episode : pictured(scenario, episodes)) {
-    plotEpisode((path / (fileLabel(*episode) + ".png")).string(), scenario, *episode, truck);
+    pictures.push_back({episode->label(), episodePicture(scenario, *episode, truck)});
+    if (pictures.back().png.empty()) continue;
+    openFile(path / (fileLabel(*episode) + ".png")) << pictures.back().png;
   }
+  openFile(path / "report.html") << htmlReport(scenario, evaluation, episodes, fingerprints, pictures);
 }
 
 }  // namespace tunnel_pilot::simulation

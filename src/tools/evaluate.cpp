@@ -58,11 +58,12 @@ bool parse(int argc, char** argv, Arguments& arguments) {
                                                        options::value(&arguments.seeds)->value_name("N"),
                                                        "number of seeds instead of the scenario's")(
       "first-seed", options::value(&arguments.first_seed)->value_name("N"),
-      "first seed instead of the scenario's")(
-      "out", options::value(&arguments.out)->value_name("DIR"),
-      "writes summary.json, CSV files and plots to DIR/<scenario>; without it only the table is "
-      "printed")("config", options::value(&arguments.config)->value_name("DIR"),
-                 "parameter files instead of the scenario's")(
+      "first seed instead of the scenario's")("out", options::value(&arguments.out)->value_name("DIR"),
+                                              "writes report.html, summary.json, CSV files and plots to "
+                                              "DIR/<scenario>; without it only the table "
+                                              "is printed")(
+      "config", options::value(&arguments.config)->value_name("DIR"),
+      "parameter files instead of the scenario's")(
       "driver", options::value(&arguments.driver)->default_value("preview_driver")->value_name("NAME"),
       "who proposes: preview_driver, lidar_driver, or all (lidar_driver steers while it is sure)")(
       "network", options::value(&arguments.network)->value_name("FILE"),
@@ -166,6 +167,20 @@ std::ofstream openCanLog(const std::string& file, const simulation::Scenario& sc
   return log;
 }
 
+// What gives the same results again. --out and --jobs are left out: no result depends on them.
+std::string commandOf(const std::string& file, const Arguments& arguments) {
+  std::string command = "evaluate " + file;
+  const auto add = [&command](const std::string& option, const std::string& value) {
+    if (!value.empty()) command += " --" + option + " " + value;
+  };
+  add("config", arguments.config);
+  add("driver", arguments.driver);
+  add("network", arguments.network);
+  add("first-seed", arguments.first_seed >= 0 ? std::to_string(arguments.first_seed) : "");
+  add("seeds", arguments.seeds > 0 ? std::to_string(arguments.seeds) : "");
+  return command;
+}
+
 // True when every goal of the scenario holds.
 bool evaluate(const std::string& file, const Arguments& arguments) {
   simulation::Scenario scenario = simulation::loadScenario(file);
@@ -174,6 +189,7 @@ bool evaluate(const std::string& file, const Arguments& arguments) {
   const int seeds = arguments.seeds > 0 ? arguments.seeds : scenario.seeds;
   simulation::Setup setup = simulation::loadSetup(scenario);
   simulation::chooseDriver(scenario, driverOf(arguments), arguments.network, setup);
+  setup.fingerprints.command = commandOf(file, arguments);
   auto plans = simulation::episodePlans(scenario, seeds);
   std::ofstream can_log;
   if (!arguments.can_log.empty()) {

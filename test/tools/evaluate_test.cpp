@@ -61,6 +61,7 @@ TEST_F(Evaluate, SameScenarioAndSeedsGiveTheSameBytesOnAnyNumberOfThreads) {
   EXPECT_EQ(first, contentsBelow(place_.file("b")));
   EXPECT_EQ(first, contentsBelow(place_.file("c")));
   EXPECT_EQ(first.count("short/summary.json"), 1u);
+  EXPECT_EQ(first.count("short/report.html"), 1u);
   EXPECT_EQ(first.count("short/episodes.csv"), 1u);
   EXPECT_EQ(first.count("short/seed_1000.csv"), 1u);
   EXPECT_EQ(first.count("short/seed_1001_reversed_perception.csv"), 1u);
@@ -89,6 +90,24 @@ TEST_F(Evaluate, SummaryIsJsonWithTheFingerprintsOfWhatWasRun) {
     EXPECT_EQ(json.at("sha256").at(part).get<std::string>().size(), 64u) << part;
   }
   EXPECT_EQ(json.at("episodes").size(), 2u);
+}
+
+TEST_F(Evaluate, ReportIsOneWellFormedPageWithTheFiguresOfTheSummary) {
+  const std::string file = scenario("{metric: lateral_rms, paper: '<&', judge: every_seed, max: 0.001}");
+  ASSERT_EQ(evaluate({file, "--seeds", "2", "--out", place_.file("a"), "--jobs", "2"}).status, 1);
+  const Outcome outcome = runProgram(
+      "/usr/bin/python3", {kPackage + "/test/tools/check_report_page.py", place_.file("a/short")});
+  EXPECT_EQ(outcome.status, 0) << outcome.output;
+}
+
+TEST_F(Evaluate, ReportTellsTheCommandThatGivesItAgain) {
+  const std::string file = scenario("{metric: lateral_rms, paper: '-', judge: every_seed, max: 9.0}");
+  ASSERT_EQ(evaluate({file, "--first-seed", "2000", "--seeds", "1", "--out", place_.file("a")}).status,
+            0);
+  EXPECT_NE(
+      contentOf(place_.file("a/short/report.html"))
+          .find("evaluate " + file + " --driver preview_driver --first-seed 2000 --seeds 1</code>"),
+      std::string::npos);
 }
 
 TEST_F(Evaluate, ALidarDriversNetworkIsNamedInTheSummaryAndItsShareTold) {

@@ -66,7 +66,8 @@ class Chart {
   std::vector<Line> areas_;
 };
 
-/// Writes images below each other as one PNG. Throws std::runtime_error when the file cannot be written.
-void writePng(const std::string& file, const std::vector<cv::Mat>& rows);
+/// Images below each other as the bytes of one PNG. Throws std::runtime_error when they cannot be
+/// encoded.
+std::string toPng(const std::vector<cv::Mat>& rows);
 
 }  // namespace tunnel_pilot::simulation

@@ -17,6 +17,7 @@ struct Fingerprints {
   std::string world;                     ///< empty without a world
   std::string driver{"preview_driver"};  ///< who proposed: the name of a DriverChoice
   std::string network{};                 ///< the lidar driver's; empty without
+  std::string command{};                 ///< that gives the same results; empty where there is none
 };
 
 }  // namespace tunnel_pilot::simulation

@@ -48,8 +48,9 @@ std::string table(const Scenario& scenario, const Evaluation& evaluation);
 /// there.
 void makeReportFolder(const std::string& folder);
 
-/// Writes summary.json, episodes.csv, one CSV per episode, and plots of the median and the worst episode
-/// (by the first goal) into `folder`, which is made when missing. The same results give the same bytes.
+/// Writes summary.json, report.html (the same for people, one page that needs nothing beside it),
+/// episodes.csv, one CSV per episode, and plots of the median and the worst episode (by the first goal)
+/// into `folder`, which is made when missing. The same results give the same bytes.
 /// Throws std::runtime_error when a file cannot be written.
 void writeReport(const std::string& folder, const Scenario& scenario, const Evaluation& evaluation,
                  const std::vector<EpisodeResult>& episodes, const Fingerprints& fingerprints,
