@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 
 namespace tunnel_pilot::shell {
 namespace {
@@ -11,9 +12,13 @@ std::string doubleText(double value) {
   if (std::isnan(value)) return ".nan";
   if (std::isinf(value)) return value > 0.0 ? ".inf" : "-.inf";
   char text[32];
-  std::snprintf(text, sizeof text, "%.17g", value);
-  const std::string digits = text;
-  return digits.find_first_of(".e") == std::string::npos ? digits + ".0" : digits;
+  // As few digits as tell the number, so that people can read it.
+  for (int digits = 15; digits <= 17; ++digits) {
+    std::snprintf(text, sizeof text, "%.*g", digits, value);
+    if (std::strtod(text, nullptr) == value) break;
+  }
+  const std::string number = text;
+  return number.find_first_of(".e") == std::string::npos ? number + ".0" : number;
 }
 
 YAML::Node mapToYaml(const XmlRpc::XmlRpcValue& value, const std::string& source) {

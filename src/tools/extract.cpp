@@ -33,7 +33,9 @@ namespace options = boost::program_options;
 using namespace tunnel_pilot;
 
 constexpr const char* kJoint = "articulation_joint";
-constexpr double kClockJump = 1.0;  // of a stamp against the time of its recording [s]
+constexpr double kClockJump = 1.0;    // of a stamp ahead of the time of its recording [s]
+constexpr double kStepBack = 0.1;     // of a stamp behind the one before [s]
+constexpr double kClockDrift = 10.0;  // of stamps against the times of their recording, over a bag [s]
 
 struct Arguments {
   std::vector<std::string> bags;
@@ -193,21 +195,38 @@ std::optional<std::size_t> articulationIn(const sensor_msgs::JointState& joints)
   return index;
 }
 
-// Tells clocks that jump: a stamp must keep its distance to the time of its recording.
+// Tells clocks that jump: stamps go on as the times of their recording do. A recorder that was held up,
+// in a fast simulation by a second and more of its time, takes messages late and then many at once:
+// stamps may go on more slowly than that for a while, but neither back nor much faster.
 class ClockCheck {
  public:
   void take(const std_msgs::Header& header, const ros::Time& recorded, const char* topic) {
     const Stamp stamp = tools::stampOf(header);
     const Stamp time = std::chrono::seconds(recorded.sec) + std::chrono::nanoseconds(recorded.nsec);
-    const auto [first, is_new] = distances_.emplace(topic, time - stamp);
-    if (!is_new && std::abs(toSeconds(time - stamp - first->second)) > kClockJump) {
-      throw std::runtime_error(std::string("the clock of '") + topic + "' jumps by " +
-                               std::to_string(toSeconds(first->second - (time - stamp))) + " s");
-    }
+    const auto [found, is_new] = clocks_.emplace(topic, Clock{stamp, time, time - stamp});
+    if (is_new) return;
+    Clock& clock = found->second;
+    const double advance = toSeconds(stamp - clock.stamp);
+    const double passed = toSeconds(time - clock.time);
+    if (advance < -kStepBack || advance - passed > kClockJump) refuse(topic, "jumps", advance - passed);
+    const double drift = toSeconds(clock.first_distance - (time - stamp));
+    if (std::abs(drift) > kClockDrift) refuse(topic, "drifts", drift);
+    clock.stamp = stamp;
+    clock.time = time;
   }
 
  private:
-  std::map<std::string, Stamp> distances_;
+  struct Clock {
+    Stamp stamp, time;     // of the last message
+    Stamp first_distance;  // of the first one's recording behind its stamp
+  };
+
+  [[noreturn]] static void refuse(const std::string& topic, const std::string& what, double seconds) {
+    throw std::runtime_error("the clock of '" + topic + "' " + what + " by " + std::to_string(seconds) +
+                             " s, or the recorder lost messages");
+  }
+
+  std::map<std::string, Clock> clocks_;
 };
 
 bool sameGeometry(const sensor_msgs::LaserScan& a, const sensor_msgs::LaserScan& b) {

@@ -11,6 +11,7 @@
 #include "tunnel_pilot/ros/motion_input.h"
 #include "tunnel_pilot/ros/parameters.h"
 #include "tunnel_pilot/ros/publisher_watch.h"
+#include "tunnel_pilot/ros/run_info.h"
 #include "tunnel_pilot/ros/sensor_pose.h"
 #include "tunnel_pilot/ros/status_text.h"
 
@@ -34,6 +35,10 @@ TEST(ParameterTree, WholeNumberPassesForANumber) {
 TEST(ParameterTree, NumberKeepsAllItsDigits) {
   const double value = 0.1 + 1e-15;
   EXPECT_EQ(value, nodeOf(tree(value)).number("key", "m", 0.0, 10.0));
+}
+
+TEST(ParameterTree, NumberIsToldInAsFewDigitsAsItNeeds) {
+  EXPECT_EQ("0.1", toYaml(XmlRpc::XmlRpcValue(0.1), "here").Scalar());
 }
 
 TEST(ParameterTree, NumberWithoutFractionIsNoWholeNumber) {
@@ -388,6 +393,21 @@ TEST(StatusText, TellsOfTheTunnelWhereThereIsNoPilot) {
 }
 
 TEST(StatusText, IsEmptyWhereNothingIsKnown) { EXPECT_TRUE(describe({}).text.empty()); }
+
+TEST(RunInfoText, IsYamlWithParametersNetworksAndTheHashesOfFiles) {
+  RunFacts facts;
+  facts.time = ros::Time(12.5);
+  facts.models = {"lidar_driver 0123"};
+  facts.parameters["/arbiter"] = tree("3");
+  facts.parameters["/arbiter"]["margin"] = 0.1;
+  facts.parameters["/arbiter"]["truck_file"] = TUNNEL_PILOT_SOURCE_DIR "/LICENSE";
+  const YAML::Node info = YAML::Load(runInfoText(facts));
+  EXPECT_EQ(12.5, info["time"].as<double>());
+  EXPECT_EQ("lidar_driver 0123", info["networks"][0].as<std::string>());
+  EXPECT_EQ(0.1, info["parameters"]["/arbiter"]["margin"].as<double>());
+  EXPECT_EQ("!", info["parameters"]["/arbiter"]["key"].Tag()) << "a text, not a number";
+  EXPECT_EQ(64U, info["files"][TUNNEL_PILOT_SOURCE_DIR "/LICENSE"].as<std::string>().size());
+}
 
 TEST(OdometryMessage, HasTheCovarianceOfWhatIsMeasured) {
   vehicle::TruckGeometry truck{};

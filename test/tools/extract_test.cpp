@@ -33,8 +33,9 @@ struct Recorded {
   bool joints = true, odometry = true;
   std::string joint = "articulation_joint";
   std::string scan_topic = "/scan";
-  double jump_at = -1.0;  // the stamps go back by 20 s there [s]
-  int fewer_beams = 0;    // of the second half's scans
+  double jump_at = -1.0;     // the stamps go back by 20 s there [s]
+  double held_up_at = -1.0;  // what is sent in the 1.5 s from there on is recorded at their end [s]
+  int fewer_beams = 0;       // of the second half's scans
 };
 
 // Articulation of the recorded drive [rad], so small that the straight way does not contradict.
@@ -57,9 +58,11 @@ class Extract : public ::testing::Test {
     const int ticks = static_cast<int>(50.0 * drive.duration);
     for (int i = 0; i < ticks; ++i) {
       const double time = 0.02 * i;
-      const ros::Time recorded(1000.0 + time);
+      const double held_up_until = drive.held_up_at + 1.5;
+      const bool held_up = drive.held_up_at >= 0.0 && time >= drive.held_up_at && time < held_up_until;
+      const ros::Time recorded(1000.0 + (held_up ? held_up_until : time));
       const bool jumped = drive.jump_at >= 0.0 && time >= drive.jump_at;
-      const ros::Time stamp(jumped ? recorded.toSec() - 20.0 : recorded.toSec());
+      const ros::Time stamp(jumped ? 980.0 + time : 1000.0 + time);
       if (drive.odometry) {
         nav_msgs::Odometry odometry;
         odometry.header.stamp = stamp;
@@ -130,6 +133,17 @@ TEST_F(Extract, ScansThatWereFilteredBeforeWillDo) {
   record("filtered.bag", drive);
   ASSERT_EQ(extract({"--out", out(), bag("filtered.bag")}).status, 0);
   EXPECT_GT(learning::readDataSet(out()).size(), 150U);
+}
+
+TEST_F(Extract, ARecorderThatWasHeldUpIsNoJumpOfTheClock) {
+  for (const double at : {0.0, 4.0}) {
+    Recorded drive;
+    drive.held_up_at = at;
+    record("late.bag", drive);
+    const Outcome outcome = extract({"--out", out(), bag("late.bag")});
+    EXPECT_EQ(outcome.status, 0) << outcome.output;
+    EXPECT_GT(learning::readDataSet(out()).size(), 150U);
+  }
 }
 
 TEST_F(Extract, StandstillAndReverseAreLeftOut) {

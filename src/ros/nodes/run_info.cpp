@@ -1,0 +1,17 @@
+#include "tunnel_pilot/ros/run_info.h"
+
+#include <ros/ros.h>
+
+#include <exception>
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "run_info");
+  try {
+    const tunnel_pilot::shell::RunInfo info{ros::NodeHandle(), ros::NodeHandle("~")};
+    ros::spin();
+  } catch (const std::exception& e) {
+    ROS_FATAL("%s", e.what());
+    return 1;
+  }
+  return 0;
+}
