@@ -23,67 +23,56 @@ std::string format(const char* pattern, Numbers... numbers) {
 // To hundredths, and never to "-0.00".
 double rounded(double value) { return std::round(100.0 * value) / 100.0 + 0.0; }
 
-void add(const std::string& line, StatusText& out) {
-  if (!out.text.empty()) out.text += '\n';
-  out.text += line;
-}
-
 bool isStopped(const StatusInput& input) {
   return input.truck && bridge::isStop(static_cast<bridge::SafetyState>(input.truck->state));
 }
 
-void addState(const StatusInput& input, StatusText& out) {
+std::string stateOf(const StatusInput& input) {
   const auto standby = static_cast<std::uint8_t>(supervision::Mode::kStandby);
   const std::string mode = input.command && input.command->mode != standby
                                ? toString(static_cast<supervision::Mode>(input.command->mode))
                                : "";
-  if (input.truck) {
-    const auto state = toString(static_cast<bridge::SafetyState>(input.truck->state));
-    add(mode.empty() ? state : state + ", " + mode, out);
-  } else if (!mode.empty()) {
-    add(mode, out);
-  }
-  if (const auto why = reasonInWords(input); !why.empty()) add(why, out);
+  if (!input.truck) return mode;
+  const auto state = toString(static_cast<bridge::SafetyState>(input.truck->state));
+  return mode.empty() ? state : state + ", " + mode;
 }
 
-void addDrive(const StatusInput& input, StatusText& out) {
+std::string speedOf(const StatusInput& input) {
+  if (!input.odometry) return "";
+  std::string speed = format("%.2f m/s", rounded(input.odometry->twist.twist.linear.x));
+  if (input.command && !input.command->stop) speed += format(" of %.2f", rounded(input.command->speed));
+  if (input.arbiter && !input.arbiter->limited_by.empty() && input.arbiter->limited_by != "none") {
+    speed += ", limit: " + words(input.arbiter->limited_by);
+  }
+  return speed;
+}
+
+void addDrive(const StatusInput& input, StatusParts& out) {
   if (input.arbiter) {
-    add("steered by: " + words(toString(static_cast<supervision::Source>(input.arbiter->source))), out);
+    out.steered_by = words(toString(static_cast<supervision::Source>(input.arbiter->source)));
+    if (std::isfinite(input.arbiter->free_distance)) {
+      out.free = format("free: %.1f m, stop takes %.1f m", input.arbiter->free_distance,
+                        input.arbiter->stopping_distance);
+    }
   }
   if (input.network) {
-    add(input.network->valid ? format("network: confidence %.2f", input.network->confidence)
-                             : "network: no proposal",
-        out);
+    out.network =
+        input.network->valid ? format("confidence %.2f", input.network->confidence) : "no proposal";
   }
-  if (input.odometry) {
-    std::string speed = format("%.2f m/s", rounded(input.odometry->twist.twist.linear.x));
-    if (input.command && !input.command->stop)
-      speed += format(" of %.2f", rounded(input.command->speed));
-    if (input.arbiter && !input.arbiter->limited_by.empty() && input.arbiter->limited_by != "none") {
-      speed += ", limit: " + words(input.arbiter->limited_by);
-    }
-    add(speed, out);
-  }
-  if (input.arbiter && std::isfinite(input.arbiter->free_distance)) {
-    add(format("free: %.1f m, stop takes %.1f m", input.arbiter->free_distance,
-               input.arbiter->stopping_distance),
-        out);
-  }
+  out.speed = speedOf(input);
 }
 
-void addTunnel(const TunnelState& tunnel, StatusText& out) {
+void addTunnel(const TunnelState& tunnel, StatusParts& out) {
   if (!tunnel.valid) {
-    add("no tunnel: " + toString(static_cast<perception::TunnelReason>(tunnel.reason)), out);
+    out.place = "no tunnel: " + toString(static_cast<perception::TunnelReason>(tunnel.reason));
     return;
   }
-  add(format("offset %+.2f m, heading %+.1f deg", tunnel.lateral_offset,
-             tunnel.heading_error * kDegrees),
-      out);
+  out.place = format("offset %+.2f m, heading %+.1f deg", tunnel.lateral_offset,
+                     tunnel.heading_error * kDegrees);
   const double radius = 1.0 / std::max(std::abs(tunnel.curvature), 1e-6);
-  std::string shape = format("width %.2f m", tunnel.width);
+  out.shape = format("width %.2f m", tunnel.width);
   if (radius < 200.0)
-    shape += format(", radius %.0f m ", radius) + (tunnel.curvature > 0 ? "left" : "right");
-  add(shape, out);
+    out.shape += format(", radius %.0f m ", radius) + (tunnel.curvature > 0 ? "left" : "right");
 }
 
 }  // namespace
@@ -109,12 +98,29 @@ Gravity gravity(const StatusInput& input) {
   return limited || lost || state == SafetyState::kDegraded ? Gravity::kLimited : Gravity::kNormal;
 }
 
-StatusText describe(const StatusInput& input) {
-  StatusText out;
-  addState(input, out);
+StatusParts partsOf(const StatusInput& input) {
+  StatusParts out;
+  out.state = stateOf(input);
+  out.reason = reasonInWords(input);
   addDrive(input, out);
   if (input.tunnel) addTunnel(*input.tunnel, out);
   out.gravity = gravity(input);
+  return out;
+}
+
+StatusText describe(const StatusInput& input) {
+  const StatusParts parts = partsOf(input);
+  StatusText out;
+  const auto add = [&out](const std::string& name, const std::string& line) {
+    if (line.empty()) return;
+    out.text += (out.text.empty() ? "" : "\n") + name + line;
+  };
+  add("", parts.state);
+  add("", parts.reason);
+  add("steered by: ", parts.steered_by);
+  add("network: ", parts.network);
+  for (const std::string& line : {parts.speed, parts.free, parts.place, parts.shape}) add("", line);
+  out.gravity = parts.gravity;
   return out;
 }
 

@@ -12,7 +12,9 @@
 #include "tunnel_pilot/ros/parameters.h"
 #include "tunnel_pilot/ros/publisher_watch.h"
 #include "tunnel_pilot/ros/run_info.h"
+#include "tunnel_pilot/ros/self_check.h"
 #include "tunnel_pilot/ros/sensor_pose.h"
+#include "tunnel_pilot/ros/status_line.h"
 #include "tunnel_pilot/ros/status_text.h"
 
 namespace tunnel_pilot::shell {
@@ -393,6 +395,161 @@ TEST(StatusText, TellsOfTheTunnelWhereThereIsNoPilot) {
 }
 
 TEST(StatusText, IsEmptyWhereNothingIsKnown) { EXPECT_TRUE(describe({}).text.empty()); }
+
+TEST(StatusLine, TellsInOneLineWhatAnOperatorAsks) {
+  auto input = drivingStatus();
+  input.network.emplace();
+  input.network->valid = true;
+  input.network->confidence = 0.87;
+  input.network->model = "lidar_driver 0123456789abcdef0123456789abcdef";
+  input.tunnel.emplace();
+  input.tunnel->valid = true;
+  input.tunnel->lateral_offset = 0.04;
+  input.tunnel->width = 5.0;
+  EXPECT_EQ(
+      "ACTIVE, autonomous: driving as asked | preview driver, network lidar_driver 0123456789ab "
+      "confidence 0.87 | 2.25 m/s of 2.50, limit: sight | offset +0.04 m, heading +0.0 deg | scan 0.05 "
+      "s "
+      "old, feedback 0.01 s old",
+      statusLine(input, {0.05, 0.01}));
+}
+
+TEST(StatusLine, SaysThatNobodyIsHeard) {
+  EXPECT_EQ("no pilot is heard | no scan, no feedback", statusLine({}, {}));
+}
+
+TEST(StatusLine, ColoursAStopRed) {
+  EXPECT_EQ("\033[31mSTOPPED\033[0m", coloured("STOPPED", Gravity::kStopped));
+}
+
+TEST(StatusPace, IsDueOnceASecond) {
+  StatusPace pace;
+  const auto input = drivingStatus();
+  EXPECT_TRUE(pace.due(input, 10.0));
+  EXPECT_FALSE(pace.due(input, 10.99));
+  EXPECT_TRUE(pace.due(input, 11.0));
+}
+
+TEST(StatusPace, IsDueAtOnceWhenTheReasonChanges) {
+  StatusPace pace;
+  auto input = drivingStatus();
+  EXPECT_TRUE(pace.due(input, 10.0));
+  input.arbiter->reason_text = "no lidar scan";
+  EXPECT_TRUE(pace.due(input, 10.05));
+  EXPECT_FALSE(pace.due(input, 10.1));
+}
+
+TEST(StatusPace, WaitsASecondBeforeItTellsThatNothingIsKnown) {
+  StatusPace pace;
+  EXPECT_FALSE(pace.due({}, 10.0));
+  EXPECT_TRUE(pace.due({}, 11.0));
+}
+
+// A pilot with a bridge and a network that drives as it should.
+CheckFacts soundPilot() {
+  CheckFacts facts;
+  facts.sim_time = true;
+  facts.clock_passed = 3.0;
+  for (const char* node : {"scan_filter", "wall_segmentation", "centerline", "preview_driver",
+                           "lidar_driver", "arbiter", "can_bridge"}) {
+    facts.nodes[node] = {true, true};
+  }
+  for (const char* topic : {"scan", "joint_states", "odom", "command"}) {
+    facts.topics[topic] = {{"/somebody"}, 100, 35.0, 0.04};
+  }
+  facts.model = "lidar_driver 0123456789abcdef";
+  facts.truck.emplace();
+  facts.truck->state = TruckStatus::STATE_STANDBY;
+  facts.truck->reason_text = "not engaged";
+  return facts;
+}
+
+// The one line that tells what is wrong.
+std::string failureOf(const CheckFacts& facts) {
+  std::string lines;
+  for (const Finding& finding : judge(facts)) {
+    if (!finding.ok) lines += finding.line() + "\n";
+  }
+  return lines;
+}
+
+TEST(SelfCheck, FindsNothingWrongWithASoundPilot) {
+  EXPECT_EQ("", failureOf(soundPilot()));
+  EXPECT_TRUE(allOk(judge(soundPilot())));
+}
+
+TEST(SelfCheck, ALineTellsWhatIsWrongAndWhatToDo) {
+  EXPECT_EQ("FAIL  scan: nobody publishes it; start the lidar",
+            (Finding{false, "scan: nobody publishes it", "start the lidar"}.line()));
+  EXPECT_EQ("OK    odom: 50.0 Hz", (Finding{true, "odom: 50.0 Hz", ""}.line()));
+}
+
+TEST(SelfCheck, FailsWithoutSimulatedTime) {
+  auto facts = soundPilot();
+  facts.clock_passed = 0.0;
+  EXPECT_NE(std::string::npos, failureOf(facts).find("simulated time stands still"));
+}
+
+TEST(SelfCheck, FailsForANodeThatRefusedItsParameters) {
+  auto facts = soundPilot();
+  facts.nodes["arbiter"] = {true, false};
+  EXPECT_EQ(0U, failureOf(facts).find("FAIL  arbiter: has parameters, but gives no sign of life"));
+}
+
+TEST(SelfCheck, FailsForANodeThatWasNotStarted) {
+  auto facts = soundPilot();
+  facts.nodes["centerline"] = {false, false};
+  EXPECT_EQ(0U, failureOf(facts).find("FAIL  centerline: is not there"));
+}
+
+TEST(SelfCheck, BridgeAndNetworkMayBeLeftOut) {
+  auto facts = soundPilot();
+  facts.nodes["can_bridge"] = facts.nodes["lidar_driver"] = {false, false};
+  facts.model.clear();
+  facts.truck.reset();
+  facts.arbiter.emplace();
+  facts.arbiter->reason_text = "driving as asked";
+  EXPECT_EQ("", failureOf(facts));
+}
+
+TEST(SelfCheck, FailsWithoutTheLidarsPlace) {
+  auto facts = soundPilot();
+  facts.mounting_problem = "it is mounted tilted";
+  EXPECT_NE(std::string::npos, failureOf(facts).find("base_link -> laser: it is mounted tilted"));
+}
+
+TEST(SelfCheck, FailsForASlowTopic) {
+  auto facts = soundPilot();
+  facts.topics["odom"].rate = 5.0;
+  EXPECT_EQ("FAIL  odom: 5.0 Hz from /somebody; at least 10 Hz are needed\n", failureOf(facts));
+}
+
+TEST(SelfCheck, FailsForASilentTopicAndForTwoPublishers) {
+  auto facts = soundPilot();
+  facts.topics["scan"].messages = 0;
+  EXPECT_EQ(0U, failureOf(facts).find("FAIL  scan: nothing came from /somebody"));
+  facts.topics["scan"].publishers = {"/one", "/two"};
+  EXPECT_EQ(0U, failureOf(facts).find("FAIL  scan: several nodes publish it: /one, /two"));
+}
+
+TEST(SelfCheck, FailsForStampsOfAnotherClock) {
+  auto facts = soundPilot();
+  facts.topics["scan"].age = -3600.0;
+  EXPECT_EQ(0U, failureOf(facts).find("FAIL  scan: its stamps are 3600.00 s ahead of the clock"));
+}
+
+TEST(SelfCheck, FailsForANetworkThatProposesNothing) {
+  auto facts = soundPilot();
+  facts.model.clear();
+  EXPECT_EQ(0U, failureOf(facts).find("FAIL  network: lidar_driver proposes nothing"));
+}
+
+TEST(SelfCheck, TellsWhyTheTruckWasStopped) {
+  auto facts = soundPilot();
+  facts.truck->state = TruckStatus::STATE_STOPPED;
+  facts.truck->reason_text = "no lidar scan";
+  EXPECT_EQ(0U, failureOf(facts).find("FAIL  truck: STOPPED: no lidar scan; "));
+}
 
 TEST(RunInfoText, IsYamlWithParametersNetworksAndTheHashesOfFiles) {
   RunFacts facts;

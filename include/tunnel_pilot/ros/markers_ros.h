@@ -10,31 +10,10 @@
 #include <tunnel_pilot/Walls.h>
 #include <visualization_msgs/MarkerArray.h>
 
-#include <optional>
-
+#include "tunnel_pilot/ros/latest.h"
 #include "tunnel_pilot/ros/status_text.h"
 
 namespace tunnel_pilot::shell {
-
-/// The latest message of a topic and when it came, by ROS time: what stands still while time does.
-template <class Message>
-class Latest {
- public:
-  void set(const Message& message) {
-    message_ = message;
-    received_ = ros::Time::now();
-  }
-  /// Empty when none came within the last `max_age` [s].
-  std::optional<Message> get(double max_age) const {
-    if (!message_) return {};
-    const double age = (ros::Time::now() - received_).toSec();
-    return age >= 0.0 && age <= max_age ? message_ : std::nullopt;
-  }
-
- private:
-  std::optional<Message> message_;
-  ros::Time received_;
-};
 
 /// Pictures for rviz' stock displays of what the pilot measures and intends. Subscribes `walls`,
 /// `tunnel_state`, `arbiter_state`, `command`, `preview_driver/proposal`, `lidar_driver/proposal`,

@@ -30,10 +30,22 @@ struct StatusInput {
   std::optional<Proposal> network;  ///< lidar_driver's
 };
 
-/// What an operator wants to read beside the truck: the safety state and mode, the one reason why it
-/// does what it does, who steers and how sure the network is, the speed and what limits it, the distance
-/// that is free and the one that a stop takes, and where the truck is in the tunnel or why that is not
-/// known.
+/// The same in words, part by part; empty what is not known.
+struct StatusParts {
+  std::string state;       ///< safety state and mode
+  std::string reason;      ///< the one reason why the truck does what it does
+  std::string steered_by;  ///< who steers
+  std::string network;     ///< how sure it is
+  std::string speed;       ///< driven and asked for, and what limits it
+  std::string free;        ///< distance that is free, and the one that a stop takes
+  std::string place;       ///< in the tunnel, or why that is not known
+  std::string shape;       ///< of the tunnel
+  Gravity gravity = Gravity::kNormal;
+};
+
+StatusParts partsOf(const StatusInput& input);
+
+/// What an operator wants to read beside the truck: the parts, one below the other.
 StatusText describe(const StatusInput& input);
 
 /// The one reason why the truck does what it does: the bridge's once it stops the truck, else the

@@ -1,0 +1,27 @@
+// One line a second, and at every change, of what the pilot does and why; coloured on a terminal.
+#include <ros/ros.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <exception>
+#include <string>
+
+#include "tunnel_pilot/ros/status_ros.h"
+
+int main(int argc, char** argv) {
+  using tunnel_pilot::shell::Gravity;
+  ros::init(argc, argv, "status", ros::init_options::AnonymousName);
+  const bool terminal = isatty(STDOUT_FILENO) != 0;
+  const auto tell = [terminal](const std::string& line, Gravity gravity) {
+    std::printf("%s\n", (terminal ? tunnel_pilot::shell::coloured(line, gravity) : line).c_str());
+    std::fflush(stdout);
+  };
+  try {
+    const tunnel_pilot::shell::StatusRos status{ros::NodeHandle(), ros::NodeHandle("~"), tell};
+    ros::spin();
+  } catch (const std::exception& e) {
+    ROS_FATAL("%s", e.what());
+    return 1;
+  }
+  return 0;
+}
