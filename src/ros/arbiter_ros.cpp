@@ -30,6 +30,8 @@ ArbiterRos::ArbiterRos(ros::NodeHandle nh, ros::NodeHandle private_nh)
   subscribe(nh);
   stop_service_ = private_nh.advertiseService("stop", &ArbiterRos::onStop, this);
   reset_service_ = private_nh.advertiseService("reset", &ArbiterRos::onReset, this);
+  offerDriver(private_nh, supervision::Source::kLidarDriver);
+  offerDriver(private_nh, supervision::Source::kPreviewDriver);
   if (ros::Time::isSimTime()) {
     timer_ = nh.createTimer(ros::Duration(kPeriod), [this](const ros::TimerEvent&) { decide(); });
   } else {
@@ -79,6 +81,20 @@ void ArbiterRos::subscribe(ros::NodeHandle& nh) {
     updateMotion();
   });
   listen<TruckStatus>(nh, "truck_status", [this](auto& m) { arbiter_.setTruckState(toCore(m), now()); });
+}
+
+void ArbiterRos::offerDriver(ros::NodeHandle& private_nh, supervision::Source driver) {
+  const auto serve = [this, driver](std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+    response.success = arbiter_.selectDriver(driver);
+    response.message = response.success ? toString(driver) + " steers while it is healthy"
+                                        : "refused: arbiter.yaml has no " + toString(driver);
+    ROS_INFO("arbiter: %s", response.message.c_str());
+    return true;
+  };
+  driver_services_.push_back(
+      private_nh.advertiseService<std_srvs::Trigger::Request, std_srvs::Trigger::Response>(
+          "use/" + toString(driver),
+          boost::function<bool(std_srvs::Trigger::Request&, std_srvs::Trigger::Response&)>(serve)));
 }
 
 void ArbiterRos::checkClock() {

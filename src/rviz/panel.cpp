@@ -63,6 +63,11 @@ Panel::Panel(QWidget* parent)
   buttons->addWidget(stop, 1, 0, 1, 2);
   buttons->addWidget(addButton("Reset", "after a stop, at standstill", {"reset", "arbiter/reset"}), 2, 0,
                      1, 2);
+  buttons->addWidget(
+      addButton("Lidar driver", "the network steers while it is sure", {"arbiter/use/lidar_driver"}), 3,
+      0);
+  buttons->addWidget(
+      addButton("Preview driver", "steers without the network", {"arbiter/use/preview_driver"}), 3, 1);
   auto* layout = new QVBoxLayout(this);
   layout->addLayout(buttons);
   layout->addWidget(answer_);
@@ -74,7 +79,7 @@ Panel::Panel(QWidget* parent)
 
 QPushButton* Panel::addButton(const char* name, const char* tip, std::vector<std::string> services) {
   auto* button = new QPushButton(name);
-  button->setObjectName(QString(name).toLower());
+  button->setObjectName(QString::fromStdString(services.front()));
   button->setToolTip(tip);
   connect(button, &QPushButton::clicked, this, [this, services = std::move(services)] {
     tell(*answer_, true, QString::fromStdString(services.front()) + " ...");

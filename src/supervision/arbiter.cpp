@@ -46,6 +46,7 @@ void Arbiter::Findings::slowFor(Reason reason) {
 
 Arbiter::Arbiter(const ArbiterParameters& parameters, const vehicle::TruckParameters& truck)
     : parameters_(parameters),
+      all_sources_(parameters.sources),
       truck_(truck),
       governor_(parameters.governor),
       envelope_(parameters.envelope, parameters.limiter, truck.geometry),
@@ -93,6 +94,21 @@ void Arbiter::setTruckState(const TruckState& state, Stamp now) {
   const bool at_rest = !state.engaged && !state.stopping;
   standby_seen_ = standby_seen_ || at_rest;
   if (at_rest && latched_ && age(latched_at_, now) > parameters_.recovery_time) latched_.reset();
+}
+
+bool Arbiter::selectDriver(Source driver) {
+  if (driver != Source::kLidarDriver && driver != Source::kPreviewDriver) return false;
+  const bool there = std::any_of(all_sources_.begin(), all_sources_.end(), [&](const SourceRule& rule) {
+    return rule.source == driver && rule.steers;
+  });
+  if (!there) return false;
+  parameters_.sources.clear();
+  for (const SourceRule& rule : all_sources_) {
+    const bool left_out = rule.source == Source::kLidarDriver && driver == Source::kPreviewDriver;
+    if (!left_out) parameters_.sources.push_back(rule);
+  }
+  disagree_since_.reset();
+  return true;
 }
 
 void Arbiter::requestStop(Stamp now) {

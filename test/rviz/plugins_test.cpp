@@ -104,8 +104,14 @@ TEST_P(PanelButtonTest, CallsItsServiceOnceAndShowsTheAnswer) {
   EXPECT_EQ(1, service.calls);
 }
 
-INSTANTIATE_TEST_SUITE_P(Edges, PanelButtonTest, ::testing::Values("engage", "release", "stop", "reset"),
-                         [](const auto& edge) { return std::string(edge.param); });
+INSTANTIATE_TEST_SUITE_P(Edges, PanelButtonTest,
+                         ::testing::Values("engage", "release", "stop", "reset",
+                                           "arbiter/use/lidar_driver", "arbiter/use/preview_driver"),
+                         [](const auto& edge) {
+                           std::string name = edge.param;
+                           std::replace(name.begin(), name.end(), '/', '_');
+                           return name;
+                         });
 
 TEST_F(PanelTest, TellsWhyAServiceRefuses) {
   FakeService service("engage", false, "no lidar scan");

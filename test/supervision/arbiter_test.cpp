@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "arbiter_bench.h"
 
 namespace tunnel_pilot::supervision {
@@ -104,6 +107,56 @@ TEST(Arbiter, TheHealthySourceOfHighestPrioritySteers) {
   bench.arbiter->setProposal(Source::kTeleoperation, bench.proposal(0.02), bench.now);
   EXPECT_EQ(bench.cycle().command.source, Source::kTeleoperation);
   EXPECT_EQ(bench.cycle().command.mode, Mode::kTeleoperation);
+}
+
+TEST(Arbiter, TheDriverSelectedSteersAndTheOneLeftOutNeitherSteersNorSlowsDown) {
+  ArbiterBench bench;
+  bench.drive();
+  const auto unsure = [&] {
+    drivers::Proposal proposal = bench.proposal(0.01, 1.0);
+    proposal.confidence = 0.0;
+    return proposal;
+  };
+  ASSERT_TRUE(bench.arbiter->selectDriver(Source::kPreviewDriver));
+  for (int i = 0; i < 100; ++i) {
+    bench.arbiter->setProposal(Source::kLidarDriver, unsure(), bench.now);
+    const Decision& decision = bench.cycle();
+    EXPECT_EQ(decision.command.source, Source::kPreviewDriver);
+    EXPECT_EQ(decision.command.reason, Reason::kNone);
+    EXPECT_DOUBLE_EQ(decision.command.speed, 3.0);
+  }
+  ASSERT_TRUE(bench.arbiter->selectDriver(Source::kLidarDriver));
+  bench.arbiter->setProposal(Source::kLidarDriver, bench.proposal(0.01), bench.now);
+  EXPECT_EQ(bench.cycle().command.source, Source::kLidarDriver);
+}
+
+TEST(Arbiter, OnlyADriverOfTheTableCanBeSelected) {
+  ArbiterBench bench;
+  bench.drive();
+  EXPECT_FALSE(bench.arbiter->selectDriver(Source::kTeleoperation));
+  EXPECT_FALSE(bench.arbiter->selectDriver(Source::kWireDriver));
+  ArbiterParameters without = bench.parameters;
+  without.sources.erase(
+      std::remove_if(without.sources.begin(), without.sources.end(),
+                     [](const SourceRule& rule) { return rule.source == Source::kPreviewDriver; }),
+      without.sources.end());
+  Arbiter alone(without, bench.truck);
+  EXPECT_FALSE(alone.selectDriver(Source::kPreviewDriver)) << "nobody would be left";
+  EXPECT_EQ(alone.parameters().sources.size(), without.sources.size());
+}
+
+TEST(Arbiter, ASelectionWhileDrivingIsNoJump) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.wanted = 0.0;
+  double last = 0.0;
+  for (int i = 0; i < 200; ++i) {
+    if (i == 100) bench.arbiter->selectDriver(Source::kPreviewDriver);
+    bench.arbiter->setProposal(Source::kLidarDriver, bench.proposal(0.1), bench.now);
+    const double angle = bench.cycle().command.articulation_angle;
+    EXPECT_LE(std::abs(angle - last), bench.parameters.limiter.max_articulation_rate * 0.02 + 1e-9);
+    last = angle;
+  }
 }
 
 TEST(Arbiter, TheLowestSpeedAskedForWinsWhoeverSteers) {

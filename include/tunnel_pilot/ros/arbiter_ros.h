@@ -21,8 +21,9 @@ namespace tunnel_pilot::shell {
 /// `joint_states`, `truck_status`; publishes `command` and `arbiter_state`. Decides on every proposal
 /// and on a timer of 50 Hz (steady time, or simulated time with use_sim_time), so that silent inputs end
 /// in a stop, not in silence. Services ~stop and ~reset (std_srvs/Trigger) latch a stop and end it, for
-/// a truck without can_bridge; with it, use the bridge's. Parameters: config/arbiter.yaml and
-/// `truck_file`. Throws config::ConfigError.
+/// a truck without can_bridge; with it, use the bridge's. Services ~use/lidar_driver and
+/// ~use/preview_driver (std_srvs/Trigger) select the driver, driving or not; the first is selected at
+/// the start. Parameters: config/arbiter.yaml and `truck_file`. Throws config::ConfigError.
 class ArbiterRos {
  public:
   ArbiterRos(ros::NodeHandle nh, ros::NodeHandle private_nh);
@@ -31,6 +32,7 @@ class ArbiterRos {
   template <class Message, class Callback>
   void listen(ros::NodeHandle& nh, const std::string& topic, Callback callback);
   void subscribe(ros::NodeHandle& nh);
+  void offerDriver(ros::NodeHandle& private_nh, supervision::Source driver);
   void onProposal(supervision::Source source, const Proposal& message);
   bool onStop(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
   bool onReset(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
@@ -52,6 +54,7 @@ class ArbiterRos {
   ros::Publisher command_publisher_, state_publisher_;
   std::vector<ros::Subscriber> subscribers_;
   ros::ServiceServer stop_service_, reset_service_;
+  std::vector<ros::ServiceServer> driver_services_;
   ros::WallTimer wall_timer_;
   ros::Timer timer_;
   Diagnostics diagnostics_;

@@ -120,6 +120,11 @@ class Arbiter {
     takeScan(stamp, now);
   }
 
+  /// Which of the drivers `lidar_driver` and `preview_driver` steers while healthy: with the second the
+  /// first is left out of the table, neither steers nor slows down. Between the two the limiter leads
+  /// over. False when the table has no such driver that steers.
+  bool selectDriver(Source driver);
+
   /// The operator's stop: latched, whatever the state.
   void requestStop(Stamp now);
   /// Ends a latched stop. Refused (false) while the truck moves or a finding stops it.
@@ -191,6 +196,7 @@ class Arbiter {
   void watchLimits(const CommandLimiter::Flags& fired, Stamp now);
 
   ArbiterParameters parameters_;
+  std::vector<SourceRule> all_sources_;  ///< parameters_ holds those that were not left out
   vehicle::TruckParameters truck_;
   SpeedGovernor governor_;
   Envelope envelope_;
