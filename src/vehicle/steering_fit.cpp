@@ -407,6 +407,33 @@ Estimate rateOf(const std::vector<double>& rates) {
   return rate;
 }
 
+// What was found, and what of it is too vague.
+SteeringFit describe(const Problem& problem, const Vector& p, const Flags& free, bool limited) {
+  Answer answer;
+  const Eigen::VectorXd left_over = problem.residuals(p, &answer);
+  const Matrix covariance = problem.covariance(p, free);
+  const auto estimate = [&](Parameter i) { return Estimate{p[i], std::sqrt(covariance(i, i)), ""}; };
+  SteeringFit fit{estimate(kDeadTime), estimate(kRate), estimate(kLag), p[kDeadBand], p[kBias]};
+  fit.hinge_frequency = p[kFrequency] / (2.0 * M_PI);
+  fit.hinge_damping = p[kDamping];
+  fit.samples = static_cast<std::size_t>(left_over.size());
+  fit.residual = std::sqrt(left_over.squaredNorm() / static_cast<double>(left_over.size()));
+  fit.fastest = answer.fastest;
+  fit.left = problem.left;
+  fit.right = problem.right;
+  refuseIfVague(fit.dead_time, kVagueTime, "the steps are too few or too small to tell it");
+  refuseIfVague(fit.lag, kVagueLag * fit.lag.value, "the steps are too few or too small to tell it");
+  if (!limited) {
+    const double least = std::min(fit.fastest, p[kRate]);
+    fit.rate = {0.0, 0.0,
+                inWords("the command did not ask for more than the hydraulics give: at least %.1f deg/s",
+                        least / kDegree)};
+  }
+  refuseIfVague(fit.rate, kVagueRate * fit.rate.value,
+                "too few steps were large and fast enough to tell it");
+  return fit;
+}
+
 }  // namespace
 
 void SteeringIdentification::add(const SteeringRecord& record) {
@@ -441,29 +468,7 @@ SteeringFit SteeringIdentification::fit(TurnDirection direction) const {
     for (const Parameter shared : {kDeadBand, kBias, kFrequency, kDamping}) free[shared] = false;
     p = refine(problem, p, free);
   }
-  Answer answer;
-  const Eigen::VectorXd left_over = problem.residuals(p, &answer);
-  const Matrix covariance = problem.covariance(p, free);
-  const auto estimate = [&](Parameter i) { return Estimate{p[i], std::sqrt(covariance(i, i)), ""}; };
-  SteeringFit fit{estimate(kDeadTime), estimate(kRate), estimate(kLag), p[kDeadBand], p[kBias]};
-  fit.hinge_frequency = p[kFrequency] / (2.0 * M_PI);
-  fit.hinge_damping = p[kDamping];
-  fit.samples = static_cast<std::size_t>(left_over.size());
-  fit.residual = std::sqrt(left_over.squaredNorm() / static_cast<double>(left_over.size()));
-  fit.fastest = answer.fastest;
-  fit.left = all.left;
-  fit.right = all.right;
-  refuseIfVague(fit.dead_time, kVagueTime, "the steps are too few or too small to tell it");
-  refuseIfVague(fit.lag, kVagueLag * fit.lag.value, "the steps are too few or too small to tell it");
-  if (!limited) {
-    const double least = std::min(fit.fastest, p[kRate]);
-    fit.rate = {0.0, 0.0,
-                inWords("the command did not ask for more than the hydraulics give: at least %.1f deg/s",
-                        least / kDegree)};
-  }
-  refuseIfVague(fit.rate, kVagueRate * fit.rate.value,
-                "too few steps were large and fast enough to tell it");
-  return fit;
+  return describe(problem, p, free, limited);
 }
 
 SweepRates sweepRates(const std::vector<TimedAngle>& measured) {
