@@ -145,20 +145,21 @@ void simulate(const Vector& p, const SteeringRecord& record, Answer& answer) {
 struct Step {
   double time;
   bool left;
+  double rate;  // the highest [rad/s]
 };
 
-// The steps, and the fastest of them [rad/s].
-std::vector<Step> stepsOf(const std::vector<TimedAngle>& commands, double& fastest) {
+std::vector<Step> stepsOf(const std::vector<TimedAngle>& commands) {
   std::vector<Step> steps;
   double going = 0.0;
   std::size_t first = 0;
   for (const TimedAngle& command : commands) {
     while (commands[first].time < command.time - kStepTime) ++first;
     const double change = command.angle - commands[first].angle;
-    fastest = std::max(fastest, std::abs(change) / kStepTime);
+    const double rate = std::abs(change) / kStepTime;
     if (std::abs(change) < 0.5 * kLeastStep) going = 0.0;
+    if (change * going > 0.0) steps.back().rate = std::max(steps.back().rate, rate);
     if (std::abs(change) < kLeastStep || change * going > 0.0) continue;
-    steps.push_back({commands[first].time, change > 0.0});
+    steps.push_back({commands[first].time, change > 0.0, rate});
     going = change;
   }
   return steps;
@@ -170,8 +171,11 @@ class Problem {
   Problem(const std::vector<SteeringRecord>& records, TurnDirection direction) : records_(records) {
     std::size_t cluster = 0;
     for (const SteeringRecord& record : records) {
-      const std::vector<Step> steps = stepsOf(record.commanded, asked);
-      for (const Step& step : steps) ++(step.left ? left : right);
+      const std::vector<Step> steps = stepsOf(record.commanded);
+      for (const Step& step : steps) {
+        ++(step.left ? left : right);
+        asked_.push_back(step.rate);
+      }
       const double begin = record.measured.front().time;
       for (const TimedAngle& sample : record.measured) {
         const auto after = std::find_if(steps.begin(), steps.end(),
@@ -250,9 +254,18 @@ class Problem {
 
   std::size_t left = 0;
   std::size_t right = 0;
-  double asked = 0.0;  // the fastest that the command moves [rad/s]
+
+  // How fast the larger steps of the command move [rad/s]; their upper quartile, which the recording's
+  // jitter does not lift.
+  double asked() const {
+    std::vector<double> rates = asked_;
+    const auto at = rates.begin() + static_cast<std::ptrdiff_t>(3 * rates.size() / 4);
+    std::nth_element(rates.begin(), at, rates.end());
+    return *at;
+  }
 
  private:
+  std::vector<double> asked_;  // one a step
   const std::vector<SteeringRecord>& records_;
   std::vector<bool> explained_;       // one a measurement
   std::vector<std::size_t> cluster_;  // likewise
@@ -343,7 +356,7 @@ void checkFollows(const Problem& problem, const Vector& best) {
 // sent a little slower than what is asked for), and where the record would be explained worse without
 // it.
 bool limitSeen(const Problem& problem, Vector p, Flags free) {
-  if (p[kRate] > kClearlySlower * problem.asked) return false;
+  if (p[kRate] > kClearlySlower * problem.asked()) return false;
   const double limited = problem.residuals(p).squaredNorm();
   p[kRate] = kUnlimited;
   free[kRate] = false;
