@@ -71,7 +71,9 @@ StatusInput StatusRos::input() const {
 void StatusRos::update() {
   const StatusInput known = input();
   if (!pace_.due(known, ros::SteadyTime::now().toSec())) return;
-  tell_(statusLine(known, {ageOf(scan_), ageOf(feedback_)}), partsOf(known).gravity);
+  const bool heard = known.truck || known.arbiter;
+  tell_(statusLine(known, {ageOf(scan_), ageOf(feedback_)}),
+        heard ? partsOf(known).gravity : Gravity::kLimited);
 }
 
 }  // namespace tunnel_pilot::shell
