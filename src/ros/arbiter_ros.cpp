@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "tunnel_pilot/ros/parameters.h"
+#include "tunnel_pilot/supervision/arbiter_tuning.h"
 
 namespace tunnel_pilot::shell {
 namespace {
@@ -24,6 +25,9 @@ ArbiterRos::ArbiterRos(ros::NodeHandle nh, ros::NodeHandle private_nh)
     : arbiter_(makeArbiter(private_nh)),
       command_publisher_(nh.advertise<TruckCommand>("command", 1)),
       state_publisher_(nh.advertise<ArbiterState>("arbiter_state", 1)),
+      tuning_(
+          private_nh, supervision::tuningOf(arbiter_), [this] { return arbiter_.mayLoosen(now()); },
+          [this](const LiveTuning::Values& values) { arbiter_.tune(values); }),
       diagnostics_(nh, private_nh, "arbiter", [this](auto& status) { fillStatus(status); }) {
   last_.command.stop = true;
   last_.command.reason = supervision::Reason::kStartUp;
@@ -180,6 +184,7 @@ void ArbiterRos::fillStatus(Diagnostics::Status& status) const {
   status.add("stop", command.stop);
   status.add("sequence", command.sequence);
   status.add("motion not finite", motion_refused_);
+  if (!tuning_.refusal().empty()) status.add("tuning refused", tuning_.refusal());
   if (!unheard_.empty()) status.add("nothing heard yet on", unheardTopics());
 }
 

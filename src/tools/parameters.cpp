@@ -1,5 +1,6 @@
-// Prints every parameter of the shipped configuration as one JSON list: file, key, value, unit, range.
-// The loaders themselves tell unit and range; scripts/generate_parameter_docs makes the tables from it.
+// Prints every parameter of the shipped configuration as one JSON list: file, key, value, unit, range,
+// and how it may be tuned under way, if at all. The loaders themselves tell unit and range;
+// scripts/generate_parameter_docs makes the tables from it.
 
 #include <exception>
 #include <functional>
@@ -19,7 +20,7 @@
 #include "tunnel_pilot/perception/wall_segmentation.h"
 #include "tunnel_pilot/simulation/simulator.h"
 #include "tunnel_pilot/simulation/truck_controller.h"
-#include "tunnel_pilot/supervision/arbiter.h"
+#include "tunnel_pilot/supervision/arbiter_tuning.h"
 #include "tunnel_pilot/vehicle/truck_parameters.h"
 
 namespace {
@@ -40,12 +41,21 @@ const std::vector<std::pair<std::string, std::function<void(const config::Node&)
     {"truck_controller", [](const config::Node& node) { simulation::loadTruckController(node); }},
 };
 
+// "lower" or "higher": where a change leads while the truck is under way. Empty: read once at the start.
+std::string tuned(const std::string& file, const std::string& key) {
+  if (file != "arbiter") return "";
+  for (const supervision::ArbiterTunable& tunable : supervision::arbiterTunables()) {
+    if (tunable.number.name == key) return tunable.number.higher_loosens ? "lower" : "higher";
+  }
+  return "";
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   const std::string usage =
-      "parameters CONFIG_FOLDER: prints every parameter as a JSON list of file, key, value, unit and "
-      "range.\n";
+      "parameters CONFIG_FOLDER: prints every parameter as a JSON list of file, key, value, unit, "
+      "range and tuning.\n";
   const std::string argument = argc == 2 ? argv[1] : "";
   if (argument == "--help" || argument == "-h") {
     std::cout << usage;
@@ -61,8 +71,12 @@ int main(int argc, char** argv) {
       const config::Node node = config::loadFile(argument + "/" + name + ".yaml");
       load(node);
       for (const config::ParameterRecord& r : node.records()) {
-        list.push_back(
-            {{"file", name}, {"key", r.key}, {"value", r.value}, {"unit", r.unit}, {"range", r.range}});
+        list.push_back({{"file", name},
+                        {"key", r.key},
+                        {"value", r.value},
+                        {"unit", r.unit},
+                        {"range", r.range},
+                        {"tuning", tuned(name, r.key)}});
       }
     }
     std::cout << list.dump(1) << "\n";

@@ -1,4 +1,6 @@
 // Each stage as a nodelet, alone: what it does with good input and with bad.
+#include <dynamic_reconfigure/ConfigDescription.h>
+#include <dynamic_reconfigure/Reconfigure.h>
 #include <nav_msgs/Path.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <tf2_ros/static_transform_broadcaster.h>
@@ -639,6 +641,86 @@ TEST_F(ArbiterTest, NumbersNeverDecrease) {
   for (std::size_t i = 1; i < commands_.messages.size(); ++i) {
     EXPECT_GE(commands_.messages[i].sequence, commands_.messages[i - 1].sequence);
   }
+}
+
+// The arbiter under a client of dynamic_reconfigure's protocol.
+class LiveTuningTest : public ArbiterTest {
+ protected:
+  using Config = dynamic_reconfigure::Config;
+
+  static Config wanted(const std::string& name, double value) {
+    Config config;
+    config.doubles.resize(1);
+    config.doubles.front().name = name;
+    config.doubles.front().value = value;
+    return config;
+  }
+
+  static Config ask(const Config& config) {
+    dynamic_reconfigure::Reconfigure call;
+    call.request.config = config;
+    EXPECT_TRUE(ros::service::call("arbiter/set_parameters", call));
+    return call.response.config;
+  }
+
+  static double valueIn(const Config& config, const std::string& name) {
+    for (const auto& parameter : config.doubles) {
+      if (parameter.name == name) return parameter.value;
+    }
+    return kNan;
+  }
+
+  static double maxSpeedAfter(double value) {
+    return valueIn(ask(wanted("governor.max_speed", value)), "governor.max_speed");
+  }
+};
+
+TEST_F(LiveTuningTest, TellsAClientWhatCanBeChangedInWhichRange) {
+  std::vector<dynamic_reconfigure::ConfigDescription> heard;
+  const ros::Subscriber subscriber = nh_.subscribe<dynamic_reconfigure::ConfigDescription>(
+      "arbiter/parameter_descriptions", 1, [&heard](const auto& m) { heard.push_back(*m); });
+  ASSERT_TRUE(spinUntil([&] { return !heard.empty(); }));
+  ASSERT_FALSE(heard.front().groups.empty());
+  EXPECT_EQ(heard.front().dflt.doubles.size(), heard.front().groups.front().parameters.size());
+  EXPECT_DOUBLE_EQ(2.0, valueIn(heard.front().max, "envelope.margin"));
+  EXPECT_DOUBLE_EQ(0.2, valueIn(heard.front().dflt, "envelope.margin"));
+}
+
+TEST_F(LiveTuningTest, LowerMaxSpeedHoldsTheTruckUnderWay) {
+  engageAndDrive();
+  EXPECT_DOUBLE_EQ(0.5, maxSpeedAfter(0.5));
+  drive(1000.6, 3);
+  EXPECT_FLOAT_EQ(0.5F, static_cast<float>(states_.messages.back().speed_limit));
+}
+
+TEST_F(LiveTuningTest, HigherMaxSpeedIsTakenInStandby) {
+  drive(1000.0, 5);
+  EXPECT_DOUBLE_EQ(9.0, maxSpeedAfter(9.0));
+}
+
+TEST_F(LiveTuningTest, HigherMaxSpeedIsRefusedUnderWayAndTheAnswerHasTheOldOne) {
+  engageAndDrive();
+  EXPECT_DOUBLE_EQ(7.0, maxSpeedAfter(9.0));
+  EXPECT_TRUE(diagnosticsSay("arbiter", "tuning refused"));
+}
+
+TEST_F(LiveTuningTest, ValueOfAnotherTypeSpoilsTheWholeRequest) {
+  drive(1000.0, 5);
+  Config config = wanted("governor.max_speed", 3.0);
+  config.ints.resize(1);
+  config.ints.front().name = "envelope.margin";
+  config.ints.front().value = 1;
+  EXPECT_DOUBLE_EQ(7.0, valueIn(ask(config), "governor.max_speed"));
+}
+
+TEST_F(LiveTuningTest, EveryAnswerIsToldToAllClients) {
+  drive(1000.0, 5);
+  std::vector<Config> heard;
+  const ros::Subscriber subscriber = nh_.subscribe<Config>(
+      "arbiter/parameter_updates", 10, [&heard](const auto& m) { heard.push_back(*m); });
+  ASSERT_TRUE(spinUntil([&] { return !heard.empty(); }));
+  maxSpeedAfter(6.0);
+  EXPECT_TRUE(spinUntil([&] { return valueIn(heard.back(), "governor.max_speed") == 6.0; }));
 }
 
 }  // namespace

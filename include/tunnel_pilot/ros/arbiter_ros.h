@@ -11,6 +11,7 @@
 #include "tunnel_pilot/ros/clock_watch.h"
 #include "tunnel_pilot/ros/conversions.h"
 #include "tunnel_pilot/ros/diagnostics.h"
+#include "tunnel_pilot/ros/live_tuning.h"
 #include "tunnel_pilot/ros/motion_input.h"
 #include "tunnel_pilot/supervision/arbiter.h"
 
@@ -23,7 +24,8 @@ namespace tunnel_pilot::shell {
 /// in a stop, not in silence. Services ~stop and ~reset (std_srvs/Trigger) latch a stop and end it, for
 /// a truck without can_bridge; with it, use the bridge's. Services ~use/lidar_driver and
 /// ~use/preview_driver (std_srvs/Trigger) select the driver, driving or not; the first is selected at
-/// the start. Parameters: config/arbiter.yaml and `truck_file`. Throws config::ConfigError.
+/// the start. Numbers of supervision::arbiterTunables() are changed while it runs by LiveTuning.
+/// Parameters: config/arbiter.yaml and `truck_file`. Throws config::ConfigError.
 class ArbiterRos {
  public:
   ArbiterRos(ros::NodeHandle nh, ros::NodeHandle private_nh);
@@ -57,6 +59,7 @@ class ArbiterRos {
   std::vector<ros::ServiceServer> driver_services_;
   ros::WallTimer wall_timer_;
   ros::Timer timer_;
+  LiveTuning tuning_;
   Diagnostics diagnostics_;
 };
 

@@ -132,6 +132,13 @@ class Arbiter {
   /// Forgets everything measured; stops if engaged.
   void clockJumped();
 
+  /// Takes other values for the numbers of arbiterTunables() from the next decision on, all at once.
+  /// They must have been checked (config::Tuning).
+  void tune(const std::vector<double>& values);
+  /// Numbers may be loosened: the truck's state was heard lately and is neither engaged nor stopping. A
+  /// truck without states counts as engaged.
+  bool mayLoosen(Stamp now) const;
+
   /// The command for now. Call it on every proposal and on a timer of at least 50 Hz.
   const Decision& decide(Stamp now);
 

@@ -76,6 +76,8 @@ class Envelope {
 
   void reset();  ///< forgets the walls passed
 
+  void setMargin(double margin) { parameters_.margin = margin; }  ///< from the next update on [m]
+
  private:
   struct Station {
     geometry::Point point;         ///< on the spine
