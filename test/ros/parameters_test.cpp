@@ -6,7 +6,7 @@
 #include <ros/ros.h>
 #include <sys/wait.h>
 
-#include <cstdlib>
+#include <cstdio>
 #include <map>
 #include <memory>
 
@@ -259,12 +259,18 @@ TEST(BadParameters, MarkersTakeNone) {
 
 class NodeTest : public ::testing::TestWithParam<const char*> {};
 
-TEST_P(NodeTest, WithoutParametersEndsWithAnErrorStatus) {
+TEST_P(NodeTest, WithoutParametersEndsWithAnErrorStatusAndSaysWhy) {
   const std::string command = std::string("timeout 20 ") + TUNNEL_PILOT_NODE_FOLDER + "/" + GetParam() +
-                              " __name:=nameless >/dev/null 2>&1";
-  const int status = std::system(command.c_str());
+                              " __name:=nameless 2>&1";
+  FILE* pipe = popen(command.c_str(), "r");
+  ASSERT_NE(nullptr, pipe);
+  std::string output;
+  char buffer[1024];
+  while (std::fgets(buffer, sizeof buffer, pipe) != nullptr) output += buffer;
+  const int status = pclose(pipe);
   ASSERT_TRUE(WIFEXITED(status));
   EXPECT_EQ(1, WEXITSTATUS(status));
+  EXPECT_NE(std::string::npos, output.find("is missing")) << output;
 }
 
 INSTANTIATE_TEST_SUITE_P(Nodes, NodeTest,

@@ -34,6 +34,7 @@ class StageNodelet : public nodelet::Nodelet {
 template <class Stage>
 int runStage(int argc, char** argv, const std::string& name) {
   ros::init(argc, argv, name);
+  const ros::NodeHandle keep_alive;  // the log ends with the last handle, before it says why
   try {
     Stage stage{ros::NodeHandle(), ros::NodeHandle("~")};
     const Heartbeat heartbeat(ros::NodeHandle(), ros::this_node::getName());

@@ -62,6 +62,7 @@ class Hinge {
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "hinge");
+  const ros::NodeHandle keep_alive;  // the log ends with the last handle, before it says why
   try {
     tunnel_pilot::shell::Hinge hinge{ros::NodeHandle(), ros::NodeHandle("~")};
     ros::spin();

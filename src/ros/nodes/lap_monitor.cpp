@@ -8,6 +8,7 @@
 // Exit status 0: the lap passed. 1: it failed, or the parameters were refused.
 int main(int argc, char** argv) {
   ros::init(argc, argv, "lap_monitor");
+  const ros::NodeHandle keep_alive;  // the log ends with the last handle, before it says why
   try {
     tunnel_pilot::shell::LapMonitor monitor{ros::NodeHandle(), ros::NodeHandle("~")};
     ros::spin();

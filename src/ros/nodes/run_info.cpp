@@ -6,6 +6,7 @@
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "run_info");
+  const ros::NodeHandle keep_alive;  // the log ends with the last handle, before it says why
   try {
     const tunnel_pilot::shell::RunInfo info{ros::NodeHandle(), ros::NodeHandle("~")};
     ros::spin();

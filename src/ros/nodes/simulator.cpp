@@ -6,6 +6,7 @@
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "simulator");
+  const ros::NodeHandle keep_alive;  // the log ends with the last handle, before it says why
   try {
     tunnel_pilot::shell::SimulatorRos simulator{ros::NodeHandle(), ros::NodeHandle("~")};
     while (ros::ok()) simulator.advance();

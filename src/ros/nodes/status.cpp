@@ -11,6 +11,7 @@
 int main(int argc, char** argv) {
   using tunnel_pilot::shell::Gravity;
   ros::init(argc, argv, "status", ros::init_options::AnonymousName);
+  const ros::NodeHandle keep_alive;  // the log ends with the last handle, before it says why
   const bool terminal = isatty(STDOUT_FILENO) != 0;
   const auto tell = [terminal](const std::string& line, Gravity gravity) {
     std::printf("%s\n", (terminal ? tunnel_pilot::shell::coloured(line, gravity) : line).c_str());
