@@ -22,16 +22,16 @@ bool isPossible(const drivers::Proposal& proposal) {
 }  // namespace
 
 int gravity(Reason reason) {
-  constexpr std::array<Reason, 26> kRising = {
-      Reason::kNotEngaged,       Reason::kStartUp,         Reason::kOperatorRelease,
-      Reason::kLimitsHit,        Reason::kDriversDisagree, Reason::kLowConfidence,
-      Reason::kNoSource,         Reason::kSourceStale,     Reason::kProposalInvalid,
-      Reason::kTunnelInvalid,    Reason::kClearance,       Reason::kObstacle,
-      Reason::kScanRejected,     Reason::kScanFrozen,      Reason::kScanStale,
-      Reason::kSpeedImplausible, Reason::kMotionStale,     Reason::kCommandStale,
-      Reason::kTrackingError,    Reason::kFeedbackCorrupt, Reason::kFeedbackStale,
-      Reason::kBusFault,         Reason::kTruckFault,      Reason::kClockJump,
-      Reason::kOperatorOverride, Reason::kOperatorStop};
+  constexpr std::array<Reason, 27> kRising = {
+      Reason::kNotEngaged,       Reason::kStartUp,          Reason::kOperatorRelease,
+      Reason::kLimitsHit,        Reason::kDriversDisagree,  Reason::kLowConfidence,
+      Reason::kNoSource,         Reason::kSourceStale,      Reason::kProposalInvalid,
+      Reason::kTunnelInvalid,    Reason::kClearance,        Reason::kObstacle,
+      Reason::kScanRejected,     Reason::kScanFrozen,       Reason::kScanStale,
+      Reason::kSpeedImplausible, Reason::kMotionStale,      Reason::kCommandStale,
+      Reason::kProcessSilent,    Reason::kTrackingError,    Reason::kFeedbackCorrupt,
+      Reason::kFeedbackStale,    Reason::kBusFault,         Reason::kTruckFault,
+      Reason::kClockJump,        Reason::kOperatorOverride, Reason::kOperatorStop};
   const auto place = std::find(kRising.begin(), kRising.end(), reason);
   return place == kRising.end() ? 0 : static_cast<int>(place - kRising.begin()) + 1;
 }

@@ -727,7 +727,7 @@ TEST(Arbiter, ADecisionTwiceAtOneTimeMovesNothing) {
 
 TEST(Arbiter, EveryReasonHasItsOwnGravity) {
   std::set<int> seen;
-  for (int code = 1; code <= static_cast<int>(Reason::kDriversDisagree); ++code) {
+  for (int code = 1; code <= static_cast<int>(Reason::kProcessSilent); ++code) {
     EXPECT_TRUE(seen.insert(gravity(static_cast<Reason>(code))).second) << code;
   }
   EXPECT_EQ(gravity(Reason::kNone), 0);
