@@ -7,7 +7,7 @@ namespace tunnel_pilot::supervision {
 
 void SteeringMonitor::start(double measured, Stamp now) {
   given_.fill({now, measured});
-  expected_ = measured;
+  expected_ = slow_ = measured;
   wrong_for_ = 0.0;
   last_ = now;
 }
@@ -30,9 +30,15 @@ void SteeringMonitor::update(double command, double measured, double speed, Stam
   const double working = std::clamp(std::abs(speed) / steering_.working_speed, 0.0, 1.0);
   const double rate = steering_.idle_rate + working * (steering_.max_rate - steering_.idle_rate);
   const double share = 1.0 - std::exp(-elapsed / steering_.lag);
-  const double wanted = commandAt(now - fromSeconds(steering_.dead_time)) - expected_;
-  expected_ += std::clamp(share * wanted, -rate * elapsed, rate * elapsed);
-  wrong_for_ = std::abs(expected_ - measured) > tolerance_ ? wrong_for_ + elapsed : 0.0;
+  const double wanted = commandAt(now - fromSeconds(steering_.dead_time));
+  const auto follow = [&](double& answer, double most) {
+    answer += std::clamp(share * (wanted - answer), -most * elapsed, most * elapsed);
+  };
+  follow(expected_, rate);
+  follow(slow_, steering_.idle_rate);
+  const auto [low, high] = std::minmax(expected_, slow_);
+  const bool wrong = measured < low - tolerance_ || measured > high + tolerance_;
+  wrong_for_ = wrong ? wrong_for_ + elapsed : 0.0;
 }
 
 }  // namespace tunnel_pilot::supervision

@@ -33,6 +33,24 @@ TEST(SteeringMonitor, AHealthyTruckThatRampsAtFullRateIsNoFault) {
   }
 }
 
+TEST(SteeringMonitor, AWeakPumpIsSlowButNoFault) {
+  SteeringMonitor monitor(truck().steering, kTolerance, kTime);
+  monitor.start(-0.5, Stamp(0));
+  double measured = -0.5;
+  for (int i = 1; i < 400; ++i) {
+    if (i > 10) measured += std::clamp(0.5 - measured, 0.0, 0.2 * 0.02);  // 11.5 deg/s
+    monitor.update(0.5, measured, 3.0, fromSeconds(0.02 * i));
+    ASSERT_FALSE(monitor.failed()) << 0.02 * i;
+  }
+}
+
+TEST(SteeringMonitor, ATruckThatTurnsTheOtherWayIsTold) {
+  SteeringMonitor monitor(truck().steering, kTolerance, kTime);
+  monitor.start(0.0, Stamp(0));
+  for (int i = 1; i < 100; ++i) monitor.update(0.3, -0.003 * i, 3.0, fromSeconds(0.02 * i));
+  EXPECT_TRUE(monitor.failed());
+}
+
 TEST(SteeringMonitor, AStuckValveIsTold) {
   SteeringMonitor monitor(truck().steering, kTolerance, kTime);
   monitor.start(0.0, Stamp(0));
@@ -42,8 +60,8 @@ TEST(SteeringMonitor, AStuckValveIsTold) {
     monitor.update(command, 0.0, 3.0, fromSeconds(0.02 * i));
     if (monitor.failed()) failed_at = 0.02 * i;
   }
-  // 5 deg are expected after 0.68 s (dead time and lag of the ramp), the fault is told 0.5 s later.
-  EXPECT_NEAR(failed_at, 1.2, 0.06);
+  // The weakest pump has 5 deg after 0.77 s (dead time, lag, 9 deg/s), the fault is told 0.5 s later.
+  EXPECT_NEAR(failed_at, 1.28, 0.06);
 }
 
 TEST(SteeringMonitor, AShortDeviationIsForgiven) {
