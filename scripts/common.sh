@@ -162,7 +162,7 @@ build_in() {
 build() {
   rm -rf build/devel  # of a build folder that was configured before this was so
   [ -f devel/setup.bash ] || rm -f build/configured
-  build_in build -DTUNNEL_PILOT_WERROR=ON "-DCATKIN_DEVEL_PREFIX=$PWD/devel" -- "$@"
+  build_in build -DTUNNEL_PILOT_WERROR=ON -DTUNNEL_PILOT_UNITY=ON "-DCATKIN_DEVEL_PREFIX=$PWD/devel" -- "$@"
 }
 
 # Makes the built package known to roslaunch and its friends.

@@ -17,7 +17,7 @@
 namespace tunnel_pilot::shell {
 namespace {
 
-constexpr double kTick = 0.2;      // [s] steady time
+constexpr double kLook = 0.2;      // [s] steady time
 constexpr double kPatience = 5.0;  // for parameters and network [s] steady time
 constexpr const char* kSimulator = "simulator";
 constexpr const char* kTextTag = "!";  // of texts in what toYaml() gives
@@ -101,7 +101,7 @@ RunInfo::RunInfo(ros::NodeHandle nh, ros::NodeHandle private_nh)
   lidar_subscriber_ = nh.subscribe("lidar_driver/proposal", 5, &RunInfo::onProposal, this);
   preview_subscriber_ = nh.subscribe("preview_driver/proposal", 5, &RunInfo::onProposal, this);
   timer_ =
-      nh.createWallTimer(ros::WallDuration(kTick), [this](const ros::WallTimerEvent&) { onTimer(); });
+      nh.createWallTimer(ros::WallDuration(kLook), [this](const ros::WallTimerEvent&) { onTimer(); });
 }
 
 void RunInfo::onProposal(const Proposal& message) {

@@ -8,7 +8,6 @@
 namespace tunnel_pilot::shell {
 namespace {
 
-constexpr char kBaseFrame[] = "base_link";
 constexpr double kLargestTilt = 0.1;  // [rad]
 
 }  // namespace

@@ -12,7 +12,7 @@
 namespace tunnel_pilot::simulation {
 namespace {
 
-constexpr double kStripWidth = 180.0, kStripHeight = 22.0, kStripEdge = 8.0;  // [pixels]
+constexpr double kRowWidth = 180.0, kRowHeight = 22.0, kRowEdge = 8.0;  // [pixels]
 
 constexpr const char* kStyle = R"(
 body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 1240px; margin: 2em auto; padding: 0 1em; }
@@ -114,7 +114,7 @@ class Scale {
   // What is not finite stands at the right end.
   double x(double value) const {
     const double share = !std::isfinite(value) ? 1.0 : span_ > 0.0 ? (value - low_) / span_ : 0.5;
-    return kStripEdge + share * (kStripWidth - 2.0 * kStripEdge);
+    return kRowEdge + share * (kRowWidth - 2.0 * kRowEdge);
   }
 
  private:
@@ -126,10 +126,10 @@ std::string strip(const Goal& goal, const std::vector<EpisodeResult>& episodes) 
   std::vector<double> values;
   for (const EpisodeResult& episode : episodes) values.push_back(metricOf(episode, goal.metric));
   const Scale scale(values, goal);
-  std::string svg = format("<svg width=\"%g\" height=\"%g\" role=\"img\">", kStripWidth, kStripHeight);
+  std::string svg = format("<svg width=\"%g\" height=\"%g\" role=\"img\">", kRowWidth, kRowHeight);
   if (goal.min || goal.max) {
     const double from = goal.min ? scale.x(*goal.min) : 0.0;
-    const double to = goal.max ? scale.x(*goal.max) : kStripWidth;
+    const double to = goal.max ? scale.x(*goal.max) : kRowWidth;
     svg += format("<rect x=\"%.1f\" y=\"3\" width=\"%.1f\" height=\"16\" fill=\"#d9f0df\" />", from,
                   std::max(1.0, to - from));
   }

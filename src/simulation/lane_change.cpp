@@ -6,9 +6,9 @@
 namespace tunnel_pilot::simulation {
 namespace {
 
-constexpr double kBehind = 5.0;        // sensed path begins so far behind the truck [m]
-constexpr double kAhead = 40.0;        // full preview [m]
-constexpr double kSpacing = 0.5;       // [m]
+constexpr double kSensedBehind = 5.0;        // sensed path begins so far behind the truck [m]
+constexpr double kSensedAhead = 40.0;        // full preview [m]
+constexpr double kSensedSpacing = 0.5;       // [m]
 constexpr double kNominalWidth = 9.0;  // a haul road's, told for completeness [m]
 constexpr double kUnlimited = 100.0;   // the speed is fixed: the governor has no say
 
@@ -103,10 +103,10 @@ class LaneChange : public ClosedLoop {
   geometry::Path seenFrom(const geometry::Pose& pose, double station) const {
     const geometry::Path& line = simulator_.world().design_line;
     std::vector<geometry::PathPoint> points;
-    for (double s = -kBehind; s <= kAhead; s += kSpacing) {
+    for (double s = -kSensedBehind; s <= kSensedAhead; s += kSensedSpacing) {
       geometry::PathPoint point = prolongedAt(line, station + s);
       const geometry::Point local = pose.inverseTransform({point.x, point.y});
-      points.push_back({s + kBehind, local.x(), local.y(),
+      points.push_back({s + kSensedBehind, local.x(), local.y(),
                         geometry::wrapAngle(point.heading - pose.heading), point.curvature});
     }
     return geometry::Path(std::move(points));
