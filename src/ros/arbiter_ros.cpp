@@ -1,6 +1,7 @@
 #include "tunnel_pilot/ros/arbiter_ros.h"
 
 #include <ros/console.h>
+#include <tunnel_pilot/ScanRejection.h>
 
 #include <boost/make_shared.hpp>
 #include <utility>
@@ -68,6 +69,9 @@ void ArbiterRos::subscribe(ros::NodeHandle& nh) {
   }
   listen<Walls>(nh, "walls", [this](auto& m) { arbiter_.setWalls(toCore(m), now()); });
   listen<sensor_msgs::PointCloud2>(nh, "points", [this](auto& m) { onPoints(m); });
+  listen<ScanRejection>(nh, "scan_rejected", [this](auto& m) {
+    arbiter_.setRejection({static_cast<bool>(m.frozen)}, now());
+  });
   listen<TunnelState>(nh, "tunnel_state", [this](auto& m) {
     tunnel_.setState(toCore(m));
     updateTunnel();
@@ -154,14 +158,14 @@ void ArbiterRos::updateTunnel() {
 
 void ArbiterRos::decide() {
   checkClock();
-  const auto previous = last_.command.reason;
   last_ = arbiter_.decide(now());
   command_publisher_.publish(boost::make_shared<TruckCommand>(toRos(last_.command)));
   state_publisher_.publish(boost::make_shared<ArbiterState>(toArbiterState(last_)));
   if (last_.command.reason == supervision::Reason::kStartUp && !unheard_.empty()) {
     ROS_WARN_THROTTLE(5.0, "arbiter: waiting for the first message on: %s", unheardTopics().c_str());
   }
-  if (last_.command.reason == previous) return;
+  if (last_.command.reason == told_) return;
+  told_ = last_.command.reason;
   ROS_INFO("arbiter: %s", toString(last_.command.reason).c_str());
   diagnostics_.tell();
 }

@@ -3,13 +3,18 @@
 #include <utility>
 
 namespace tunnel_pilot::shell {
+namespace {
+
+constexpr double kPeriod = 0.5;  // [s] steady time
+
+}  // namespace
 
 Diagnostics::Diagnostics(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh,
                          const std::string& stage, std::function<void(Status&)> fill)
     : updater_(nh, private_nh, private_nh.getNamespace()) {
   updater_.setHardwareID("none");
   updater_.add(stage, [fill = std::move(fill)](Status& status) { fill(status); });
-  timer_ = nh.createWallTimer(ros::WallDuration(1.0),
+  timer_ = nh.createWallTimer(ros::WallDuration(kPeriod),
                               [this](const ros::WallTimerEvent&) { updater_.force_update(); });
 }
 

@@ -20,6 +20,7 @@ ScanFilterRos::ScanFilterRos(ros::NodeHandle nh, const ros::NodeHandle& private_
       filter_(perception::loadScanFilter(parameters.rest())),
       scan_publisher_(nh.advertise<sensor_msgs::LaserScan>("scan_filtered", 1)),
       points_publisher_(nh.advertise<sensor_msgs::PointCloud2>("points", 1)),
+      rejection_publisher_(nh.advertise<ScanRejection>("scan_rejected", 1)),
       scan_subscriber_(
           nh.subscribe("scan", 1, &ScanFilterRos::onScan, this, ros::TransportHints().tcpNoDelay())),
       diagnostics_(nh, private_nh, "scan_filter", [this](auto& status) { fillStatus(status); }) {}
@@ -34,13 +35,13 @@ void ScanFilterRos::onScan(const ScanEvent& event) {
   const std::string why = publishers_.whyRefused(event.getPublisherName(), ros::SteadyTime::now());
   if (!why.empty()) {
     ++foreign_;
-    problem_ = "scan rejected: " + why;
+    reject(message, "scan rejected: " + why);
     ROS_ERROR_THROTTLE(1.0, "scan_filter: %s", problem_.c_str());
     return;
   }
   const auto sensor = sensor_pose_.find(message.header.frame_id);
   if (!sensor) {
-    problem_ = sensor_pose_.whyNot();
+    reject(message, sensor_pose_.whyNot());
     ROS_ERROR_THROTTLE(1.0, "scan_filter: %s", problem_.c_str());
     return;
   }
@@ -50,8 +51,19 @@ void ScanFilterRos::onScan(const ScanEvent& event) {
     publish(result, message);
     return;
   }
-  problem_ = "scan rejected: " + toString(result.rejection);
+  reject(message, "scan rejected: " + toString(result.rejection),
+         result.rejection == ScanFilter::Rejection::kFrozen);
   ROS_WARN_THROTTLE(1.0, "scan_filter: %s", problem_.c_str());
+}
+
+void ScanFilterRos::reject(const sensor_msgs::LaserScan& scan, const std::string& why, bool frozen) {
+  problem_ = why;
+  ScanRejection rejection;
+  rejection.header.stamp = ros::Time::now();  // the scan's own may be what is wrong with it
+  rejection.header.frame_id = scan.header.frame_id;
+  rejection.frozen = frozen;
+  rejection.text = why;
+  rejection_publisher_.publish(boost::make_shared<ScanRejection>(std::move(rejection)));
 }
 
 void ScanFilterRos::publish(const ScanFilter::Result& result, const sensor_msgs::LaserScan& source) {

@@ -82,9 +82,15 @@ std::string words(std::string name) {
   return name;
 }
 
+// The bridge's reason is that of its last change of state, the arbiter's is of now: where the arbiter
+// finds something wrong, it comes first, unless the bridge stops the truck or does not hear it.
 std::string reasonInWords(const StatusInput& input) {
-  const bool bridges = input.truck && (isStopped(input) || !input.arbiter);
-  return bridges ? input.truck->reason_text : input.arbiter ? input.arbiter->reason_text : "";
+  if (!input.truck) return input.arbiter ? input.arbiter->reason_text : "";
+  const auto not_engaged = static_cast<std::uint8_t>(supervision::Reason::kNotEngaged);
+  const bool finds = input.arbiter && input.arbiter->reason > not_engaged;
+  const bool deaf = input.truck->state == TruckStatus::STATE_INIT;
+  const bool bridges = isStopped(input) || deaf || !finds;
+  return bridges ? input.truck->reason_text : input.arbiter->reason_text;
 }
 
 Gravity gravity(const StatusInput& input) {

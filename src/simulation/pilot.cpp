@@ -58,7 +58,10 @@ void Pilot::takeScan(const geometry::Scan& scan, Stamp now) {
   takeMotion(now);
   const perception::Tunnel* tunnel =
       perception_.update(scan, sensor_in_base_, history_.poseAt(scan.stamp), now);
-  if (tunnel == nullptr) return;  // the arbiter sees that no scan came
+  if (tunnel == nullptr) {
+    const bool frozen = perception_.filtered().rejection == perception::ScanFilter::Rejection::kFrozen;
+    return arbiter_.setRejection({frozen}, now);
+  }
   arbiter_.setPoints(perception_.filtered().points->points, scan.stamp, now);
   arbiter_.setWalls(perception_.walls(), now);
   tunnel_ = *tunnel;

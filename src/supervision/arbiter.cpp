@@ -61,6 +61,11 @@ void Arbiter::setProposal(Source source, const drivers::Proposal& proposal, Stam
   slots_.at(static_cast<std::size_t>(source)) = {proposal, now};
 }
 
+void Arbiter::setRejection(const ScanRejection& rejection, Stamp now) {
+  rejection_ = rejection;
+  rejection_received_ = now;
+}
+
 void Arbiter::setWalls(const perception::Walls& walls, Stamp) { walls_ = walls; }
 
 void Arbiter::takeScan(Stamp stamp, Stamp now) {
@@ -133,6 +138,7 @@ void Arbiter::clockJumped() {
   envelope_.reset();
   yaw_.reset();
   scan_received_.reset();
+  rejection_received_.reset();
   gap_ended_.reset();
   tunnel_received_.reset();
   tunnel_valid_received_.reset();
@@ -199,16 +205,24 @@ void Arbiter::compareDrivers(Stamp now) {
   }
 }
 
+// No scan was accepted lately: do any come at all?
+Reason Arbiter::whyNoScan(Stamp now) const {
+  const bool accepted = age(scan_received_, now) <= parameters_.scan_degraded_age;
+  const bool come = age(rejection_received_, now) <= parameters_.scan_degraded_age;
+  if (accepted || !come) return Reason::kScanStale;
+  return rejection_.frozen ? Reason::kScanFrozen : Reason::kScanRejected;
+}
+
 void Arbiter::assessScan(Stamp now, Findings& findings) const {
   if (!scan_received_) return findings.stopFor(Reason::kStartUp);
   const double received = age(scan_received_, now);
   const double oldest = std::max(received, toSeconds(now - points_stamp_));
-  if (oldest > parameters_.scan_stop_age) findings.stopFor(Reason::kScanStale);
-  if (received > parameters_.scan_degraded_age) findings.slowFor(Reason::kScanStale);
+  if (oldest > parameters_.scan_stop_age) findings.stopFor(whyNoScan(now));
+  if (received > parameters_.scan_degraded_age) findings.slowFor(whyNoScan(now));
   if (!parameters_.wall_checks) return;
   if (!corridor_stamp_) return findings.stopFor(Reason::kStartUp);
   if (toSeconds(now - *corridor_stamp_) > parameters_.scan_stop_age) {
-    findings.stopFor(Reason::kScanStale);
+    findings.stopFor(whyNoScan(now));
   }
 }
 

@@ -364,41 +364,45 @@ TEST_P(BadInputTest, IsToldAndStops) {
   EXPECT_TRUE(truck().command.stop) << "a stop is not ended by recovery";
 }
 
-const std::vector<Reason> kNoScan = {Reason::kScanStale};
+const std::vector<Reason> kRejected = {Reason::kScanRejected};
+const std::vector<Reason> kFrozen = {Reason::kScanFrozen};
 const std::vector<Reason> kNoMotion = {Reason::kMotionStale};
 
 INSTANTIATE_TEST_SUITE_P(
     Scan, BadInputTest,
     ::testing::Values(
-        Bad{"scan_filter", "suit the angles", kNoScan, onScan([](auto& s) { s.ranges.resize(300); })},
-        Bad{"scan_filter", "suit the angles", kNoScan, onScan([](auto& s) { s.ranges.clear(); })},
-        Bad{"scan_filter", "suit the angles", kNoScan,
+        Bad{"scan_filter", "suit the angles", kRejected, onScan([](auto& s) { s.ranges.resize(300); })},
+        Bad{"scan_filter", "suit the angles", kRejected, onScan([](auto& s) { s.ranges.clear(); })},
+        Bad{"scan_filter", "suit the angles", kRejected,
             onScan([](auto& s) { s.ranges.resize(1000000, 2.F); })},
-        Bad{"scan_filter", "every range is NaN", kNoScan, onScan([](auto& s) { fill(s, float(kNan)); })},
-        Bad{"scan_filter", "every range is infinite", kNoScan,
+        Bad{"scan_filter", "every range is NaN", kRejected,
+            onScan([](auto& s) { fill(s, float(kNan)); })},
+        Bad{"scan_filter", "every range is infinite", kRejected,
             onScan([](auto& s) { fill(s, kInfinity); })},
-        Bad{"scan_filter", "every range is infinite", kNoScan,
+        Bad{"scan_filter", "every range is infinite", kRejected,
             onScan([](auto& s) { fill(s, -kInfinity); })},
-        Bad{"scan_filter", "negative range", kNoScan, onScan([](auto& s) { fill(s, -3.0F); })},
-        Bad{"scan_filter", "no return", kNoScan, onScan([](auto& s) { fill(s, 0.0F); })},
-        Bad{"scan_filter", "frozen", kNoScan, onScan([first = std::vector<float>()](auto& s) mutable {
+        Bad{"scan_filter", "negative range", kRejected, onScan([](auto& s) { fill(s, -3.0F); })},
+        Bad{"scan_filter", "no return", kRejected, onScan([](auto& s) { fill(s, 0.0F); })},
+        Bad{"scan_filter", "frozen", kFrozen, onScan([first = std::vector<float>()](auto& s) mutable {
               if (first.empty()) first = s.ranges;
               s.ranges = first;
             })},
-        Bad{"scan_filter", "future", kNoScan,
+        Bad{"scan_filter", "future", kRejected,
             onScan([](auto& s) { s.header.stamp += ros::Duration(5.0); })},
-        Bad{"scan_filter", "before the last", kNoScan,
+        Bad{"scan_filter", "before the last", kRejected,
             onScan([](auto& s) { s.header.stamp -= ros::Duration(5.0); })},
-        Bad{"scan_filter", "before the last", kNoScan,
+        Bad{"scan_filter", "before the last", kRejected,
             onScan([](auto& s) { s.header.stamp = ros::Time(); })},
-        Bad{"scan_filter", "geometry differs", kNoScan, onScan([](auto& s) { s.range_max = 30.0F; })},
-        Bad{"scan_filter", "geometry differs", kNoScan, onScan([](auto& s) {
+        Bad{"scan_filter", "geometry differs", kRejected, onScan([](auto& s) { s.range_max = 30.0F; })},
+        Bad{"scan_filter", "geometry differs", kRejected, onScan([](auto& s) {
               s.ranges.resize(541);
               s.angle_increment = (s.angle_max - s.angle_min) / 540.0F;
             })},
-        Bad{"scan_filter", "make no sense", kNoScan, onScan([](auto& s) { s.angle_increment = 0.0F; })},
-        Bad{"scan_filter", "make no sense", kNoScan, onScan([](auto& s) { s.angle_min = float(kNan); })},
-        Bad{"scan_filter", "frame changed", kNoScan,
+        Bad{"scan_filter", "make no sense", kRejected,
+            onScan([](auto& s) { s.angle_increment = 0.0F; })},
+        Bad{"scan_filter", "make no sense", kRejected,
+            onScan([](auto& s) { s.angle_min = float(kNan); })},
+        Bad{"scan_filter", "frame changed", kRejected,
             onScan([](auto& s) { s.header.frame_id = "elsewhere"; })}));
 
 INSTANTIATE_TEST_SUITE_P(
@@ -435,7 +439,7 @@ TEST_F(OwnTruckTest, ASecondPublisherOfScansStops) {
     _exit(127);
   }
   EXPECT_TRUE(truck().runUntil([] { return truck().command.stop; }, 300.0));
-  EXPECT_EQ(static_cast<int>(Reason::kScanStale), truck().command.reason);
+  EXPECT_EQ(static_cast<int>(Reason::kScanRejected), truck().command.reason);
   EXPECT_TRUE(truck().runUntil(
       [] { return truck().says("scan_filter", "more than one node publishes"); }, 30.0));
   kill(rogue, SIGKILL);

@@ -375,10 +375,43 @@ TEST(StatusText, TellsWhyTheTruckIsNotReady) {
   auto input = drivingStatus();
   input.truck->state = TruckStatus::STATE_STANDBY;
   input.arbiter->stop = true;
+  input.arbiter->reason = static_cast<std::uint8_t>(supervision::Reason::kTunnelInvalid);
   input.arbiter->reason_text = "no valid tunnel";
   const auto status = describe(input);
   EXPECT_EQ(Gravity::kStandby, status.gravity);
   EXPECT_TRUE(tells(status, "no valid tunnel"));
+}
+
+TEST(StatusText, TellsTheBridgesReasonWhereTheArbiterFindsNothingWrong) {
+  auto input = drivingStatus();
+  input.truck->state = TruckStatus::STATE_DEGRADED;
+  input.truck->reason_text = "the driver's proposal is too old";
+  EXPECT_TRUE(tells(describe(input), "the driver's proposal is too old"));
+  input.truck->state = TruckStatus::STATE_STANDBY;
+  input.truck->reason_text = "the operator took over";
+  input.arbiter->reason = static_cast<std::uint8_t>(supervision::Reason::kNotEngaged);
+  input.arbiter->reason_text = "not engaged";
+  EXPECT_TRUE(tells(describe(input), "the operator took over"));
+}
+
+TEST(StatusText, TellsTheBridgesReasonWhileItDoesNotHearTheTruck) {
+  auto input = drivingStatus();
+  input.truck->state = TruckStatus::STATE_INIT;
+  input.truck->reason_text = "no fresh frames from the truck";
+  input.arbiter->reason = static_cast<std::uint8_t>(supervision::Reason::kMotionStale);
+  input.arbiter->reason_text = "no motion feedback";
+  EXPECT_TRUE(tells(describe(input), "no fresh frames from the truck"));
+  EXPECT_FALSE(tells(describe(input), "no motion feedback"));
+}
+
+TEST(StatusText, TellsWhatTheArbiterFindsNowRatherThanWhyTheBridgeDegradedBefore) {
+  auto input = drivingStatus();
+  input.truck->state = TruckStatus::STATE_DEGRADED;
+  input.truck->reason_text = "no lidar scan";
+  input.arbiter->reason = static_cast<std::uint8_t>(supervision::Reason::kLowConfidence);
+  input.arbiter->reason_text = "low confidence of the driver";
+  EXPECT_TRUE(tells(describe(input), "low confidence of the driver"));
+  EXPECT_FALSE(tells(describe(input), "no lidar scan"));
 }
 
 TEST(StatusText, TellsOfTheTunnelWhereThereIsNoPilot) {

@@ -7,6 +7,7 @@
 #include <tunnel_pilot/ArbiterState.h>
 #include <tunnel_pilot/LoadNetwork.h>
 #include <tunnel_pilot/Proposal.h>
+#include <tunnel_pilot/ScanRejection.h>
 #include <tunnel_pilot/TruckCommand.h>
 #include <tunnel_pilot/TruckStatus.h>
 #include <tunnel_pilot/TunnelState.h>
@@ -29,7 +30,8 @@ class ScanFilterTest : public StageTest {
   ScanFilterTest()
       : scan_(nh_.advertise<sensor_msgs::LaserScan>("scan", 10)),
         points_(nh_, "points"),
-        filtered_(nh_, "scan_filtered") {
+        filtered_(nh_, "scan_filtered"),
+        rejected_(nh_, "scan_rejected") {
     EXPECT_TRUE(load("scan_filter", "scan_filter"));
     EXPECT_TRUE(spinUntil(
         [&] { return scan_.getNumSubscribers() > 0 && points_.connected() && filtered_.connected(); }));
@@ -71,17 +73,22 @@ class ScanFilterTest : public StageTest {
   void expectRejected(const sensor_msgs::LaserScan& bad, const std::string& told) {
     points_.messages.clear();
     filtered_.messages.clear();
+    rejected_.messages.clear();
     send(scan_, bad);
     ros::WallDuration(0.02).sleep();  // the stage's queue holds one scan
     EXPECT_TRUE(accepts(tunnelScan(nextTime()))) << "a good scan after the bad one";
     EXPECT_EQ(1u, points_.messages.size());
     EXPECT_TRUE(diagnosticsSay("scan_filter", told));
+    ASSERT_EQ(1u, rejected_.messages.size());
+    EXPECT_NE(std::string::npos, rejected_.messages[0].text.find(told)) << rejected_.messages[0].text;
+    EXPECT_EQ(told == "frozen", static_cast<bool>(rejected_.messages[0].frozen));
   }
 
   double time_ = 1000.0;
   ros::Publisher scan_;
   Listener<sensor_msgs::PointCloud2> points_;
   Listener<sensor_msgs::LaserScan> filtered_;
+  Listener<ScanRejection> rejected_;
   tf2_ros::StaticTransformBroadcaster broadcaster_;
 };
 

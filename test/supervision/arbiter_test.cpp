@@ -375,6 +375,59 @@ TEST(Arbiter, ScansMissingSlowDownAfterATenthAndStopAfterThreeTenthsOfASecond) {
   }
 }
 
+// The limits are those of missing scans; only the words tell that some come and why they are refused.
+TEST(Arbiter, RejectedScansAreToldFromMissingOnes) {
+  for (const bool frozen : {false, true}) {
+    const Reason expected = frozen ? Reason::kScanFrozen : Reason::kScanRejected;
+    for (const int gap : {99, 101, 299, 301}) {  // [ms] since the last scan was accepted
+      ArbiterBench bench;
+      bench.latency = Stamp(0);
+      bench.drive();
+      const Stamp last_scan = bench.now;
+      bench.give_scan = bench.give_proposal = false;
+      while (bench.now + milliseconds(20) < last_scan + milliseconds(gap)) {
+        bench.arbiter->setRejection({frozen}, bench.now + milliseconds(20));
+        bench.cycle();
+      }
+      const Stamp then = last_scan + milliseconds(gap);
+      bench.motion.stamp = then;
+      bench.arbiter->setMotion(bench.motion, then);
+      bench.arbiter->setTruckState(bench.state, then);
+      const Decision& decision = bench.arbiter->decide(then);
+      EXPECT_EQ(decision.degraded || decision.command.stop, gap > 100) << gap;
+      EXPECT_EQ(decision.command.stop, gap > 300) << gap;
+      EXPECT_EQ(decision.command.reason == expected, gap > 100) << gap;
+    }
+  }
+}
+
+TEST(Arbiter, AfterTheLastRejectedScanThereIsNone) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.give_scan = bench.give_proposal = false;
+  bench.arbiter->setRejection({false}, bench.now);
+  EXPECT_EQ(bench.cycles(20).command.reason, Reason::kScanStale);
+}
+
+TEST(Arbiter, RejectedScansBetweenAcceptedOnesAreNoFault) {
+  ArbiterBench bench;
+  bench.drive();
+  for (int i = 0; i < 20; ++i) {
+    bench.arbiter->setRejection({true}, bench.now);
+    EXPECT_EQ(bench.cycle().command.reason, Reason::kNone);
+  }
+}
+
+TEST(Arbiter, ScansRejectedBeforeAnyWasAcceptedAreStartingUp) {
+  ArbiterBench bench;
+  bench.give_scan = bench.give_proposal = false;
+  for (int i = 0; i < 20; ++i) {
+    bench.arbiter->setRejection({false}, bench.now);
+    bench.cycle();
+  }
+  EXPECT_EQ(bench.cycle().command.reason, Reason::kStartUp);
+}
+
 // Between a scan's points and the proposal that comes of them lie other decisions.
 TEST(Arbiter, AScanAfterAGapIsGivenTimeToBecomeAProposal) {
   ArbiterBench bench;

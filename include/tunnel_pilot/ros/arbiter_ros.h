@@ -4,6 +4,7 @@
 #include <sensor_msgs/PointCloud2.h>
 #include <std_srvs/Trigger.h>
 
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -18,11 +19,11 @@
 namespace tunnel_pilot::shell {
 
 /// Shell of supervision::Arbiter. Subscribes `lidar_driver/proposal`, `preview_driver/proposal`,
-/// `teleoperation/proposal`, `walls`, `points`, `tunnel_state` with `centerline`, `odom`,
-/// `joint_states`, `truck_status`; publishes `command` and `arbiter_state`. Decides on every proposal
-/// and on a timer of 50 Hz (steady time, or simulated time with use_sim_time), so that silent inputs end
-/// in a stop, not in silence. Services ~stop and ~reset (std_srvs/Trigger) latch a stop and end it, for
-/// a truck without can_bridge; with it, use the bridge's. Services ~use/lidar_driver and
+/// `teleoperation/proposal`, `walls`, `points`, `scan_rejected`, `tunnel_state` with `centerline`,
+/// `odom`, `joint_states`, `truck_status`; publishes `command` and `arbiter_state`. Decides on every
+/// proposal and on a timer of 50 Hz (steady time, or simulated time with use_sim_time), so that silent
+/// inputs end in a stop, not in silence. Services ~stop and ~reset (std_srvs/Trigger) latch a stop and
+/// end it, for a truck without can_bridge; with it, use the bridge's. Services ~use/lidar_driver and
 /// ~use/preview_driver (std_srvs/Trigger) select the driver, driving or not; the first is selected at
 /// the start. Numbers of supervision::arbiterTunables() are changed while it runs by LiveTuning.
 /// Parameters: config/arbiter.yaml and `truck_file`. Throws config::ConfigError.
@@ -48,6 +49,7 @@ class ArbiterRos {
 
   supervision::Arbiter arbiter_;
   supervision::Decision last_;
+  std::optional<supervision::Reason> told_;  // in the log; none before the first decision
   ClockWatch clock_;
   MotionInput motion_;
   TunnelInput tunnel_;

@@ -67,7 +67,7 @@ class CanBridgeRos {
   Stamp last_tick_{};
   Stamp published_motion_{};
   Stamp published_status_{};
-  std::uint32_t told_transitions_ = 0;
+  std::optional<std::uint32_t> told_transitions_;  // none: not even the state at the start
   std::string told_trouble_;
 
   ros::Publisher joint_publisher_, odometry_publisher_, status_publisher_;

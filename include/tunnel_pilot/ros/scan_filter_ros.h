@@ -2,6 +2,7 @@
 
 #include <ros/node_handle.h>
 #include <sensor_msgs/LaserScan.h>
+#include <tunnel_pilot/ScanRejection.h>
 
 #include <string>
 
@@ -17,9 +18,9 @@ namespace tunnel_pilot::shell {
 /// Shell of perception::ScanFilter. Subscribes `scan` (any planar lidar that covers +-90 degrees), needs
 /// TF base_link -> the scan's frame once. Publishes `scan_filtered` (sensor_msgs/LaserScan, the
 /// network's 761 beams, frame of the scan) and `points` (sensor_msgs/PointCloud2 in base_link), both
-/// with the scan's stamp; nothing for a rejected scan, which is logged, counted and told on
-/// /diagnostics. While more than one node publishes
-/// `scan`, every scan is rejected. Parameters:
+/// with the scan's stamp; for a rejected scan `scan_rejected` (tunnel_pilot/ScanRejection) instead, and
+/// it is logged, counted and told on /diagnostics. While more than one node publishes `scan`, every scan
+/// is rejected. Parameters:
 /// config/scan_filter.yaml, and `publisher`, the only node that may publish `scan` (absent: any one
 /// node). Throws config::ConfigError.
 class ScanFilterRos {
@@ -31,6 +32,7 @@ class ScanFilterRos {
 
   using ScanEvent = ros::MessageEvent<const sensor_msgs::LaserScan>;
   void onScan(const ScanEvent& event);
+  void reject(const sensor_msgs::LaserScan& scan, const std::string& why, bool frozen = false);
   void publish(const perception::ScanFilter::Result& result, const sensor_msgs::LaserScan& source);
   void fillStatus(Diagnostics::Status& status) const;
 
@@ -42,6 +44,7 @@ class ScanFilterRos {
   std::uint64_t foreign_ = 0;            // scans rejected for who published them
   ros::Publisher scan_publisher_;
   ros::Publisher points_publisher_;
+  ros::Publisher rejection_publisher_;
   ros::Subscriber scan_subscriber_;
   Diagnostics diagnostics_;
 };

@@ -48,8 +48,9 @@ StatusParts partsOf(const StatusInput& input);
 /// What an operator wants to read beside the truck: the parts, one below the other.
 StatusText describe(const StatusInput& input);
 
-/// The one reason why the truck does what it does: the bridge's once it stops the truck, else the
-/// arbiter's. Empty when neither is known.
+/// The one reason why the truck does what it does: the bridge's once it stops the truck, while it does
+/// not hear the truck, and where the arbiter finds nothing wrong; else the arbiter's. Empty when neither
+/// is known.
 std::string reasonInWords(const StatusInput& input);
 Gravity gravity(const StatusInput& input);
 /// "lidar_driver" as "lidar driver".

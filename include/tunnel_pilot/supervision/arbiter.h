@@ -69,6 +69,11 @@ struct TruckState {
   Reason reason = Reason::kNotEngaged;
 };
 
+/// A scan that the scan filter did not accept.
+struct ScanRejection {
+  bool frozen = false;  ///< the lidar repeats the same scan
+};
+
 /// What the arbiter lets out, and why.
 struct Decision {
   Command command;
@@ -106,6 +111,8 @@ class Arbiter {
   const ArbiterParameters& parameters() const { return parameters_; }
 
   void setProposal(Source source, const drivers::Proposal& proposal, Stamp now);
+  /// A scan came and was not accepted. It changes no limit, only which words tell that none is accepted.
+  void setRejection(const ScanRejection& rejection, Stamp now);
   void setWalls(const perception::Walls& walls, Stamp now);
   void setTunnel(const perception::Tunnel& tunnel, Stamp now);
   void setMotion(const drivers::Motion& motion, Stamp now);
@@ -177,6 +184,7 @@ class Arbiter {
   Health health(const SourceRule& rule, Stamp now) const;
   bool engaged() const;
   bool motionHealthy(Stamp now) const;
+  Reason whyNoScan(Stamp now) const;
   void assessScan(Stamp now, Findings& findings) const;
   void assessTunnel(Stamp now, Findings& findings) const;
   void assessMotion(Stamp now, Findings& findings) const;
@@ -224,6 +232,8 @@ class Arbiter {
   std::optional<geometry::Pose> centerline_pose_;  ///< its frame in odom
   Stamp points_stamp_{};
   std::optional<Stamp> scan_received_;
+  ScanRejection rejection_;  ///< the last
+  std::optional<Stamp> rejection_received_;
   std::optional<Stamp> gap_ended_;  // when the last scan that was late came
   std::optional<Stamp> tunnel_received_, tunnel_valid_received_;
   std::optional<Stamp> motion_received_;
