@@ -467,6 +467,7 @@ TEST(StatusPace, IsDueAtOnceWhenTheReasonChanges) {
   StatusPace pace;
   auto input = drivingStatus();
   EXPECT_TRUE(pace.due(input, 10.0));
+  input.arbiter->reason = static_cast<std::uint8_t>(supervision::Reason::kScanStale);
   input.arbiter->reason_text = "no lidar scan";
   EXPECT_TRUE(pace.due(input, 10.05));
   EXPECT_FALSE(pace.due(input, 10.1));
