@@ -92,7 +92,7 @@ Injection::Injection(const std::function<void()>& act)
     : thread_([this, act] {
         begin_ = steadyTime().count();
         act();
-        done_ = true;
+        end_ = steadyTime().count();
       }) {}
 
 // -------- Pilot
@@ -115,7 +115,6 @@ bool Pilot::run(double seconds, const std::function<bool()>& until) {
 void Pilot::step() {
   sleepUntil(next_tick_);
   const Stamp now = steadyTime();
-  worst_delay_ = std::max(worst_delay_, toSeconds(now - next_tick_));
   next_tick_ = std::max(next_tick_ + kTick, now);
   if (now >= next_command_) {
     next_command_ = std::max(next_command_ + kCommandPeriod, now);
@@ -149,8 +148,6 @@ bool Pilot::busWorks() const {
   return bus->state() != can::BusState::kDown && bus->state() != can::BusState::kBusOff;
 }
 
-double Pilot::takeWorstDelay() { return std::exchange(worst_delay_, 0.0); }
-
 // -------- faults
 
 void provoke(const std::string& word) { writeTo("/sys/kernel/debug/can_fault", "can0 " + word); }
@@ -167,7 +164,7 @@ void setLink(const std::string& interface, bool up) {
 }
 
 void configure(const std::string& interface) {
-  const std::string command = "ip link set " + interface + " type can bitrate 500000 restart-ms 0";
+  const std::string command = "/sbin/ip link set " + interface + " type can bitrate 500000 restart-ms 0";
   if (std::system(command.c_str()) != 0) throw std::runtime_error("failed: " + command);
 }
 

@@ -42,12 +42,13 @@ class Injection {
   explicit Injection(const std::function<void()>& act);
   ~Injection() { thread_.join(); }
   Stamp begin() const { return Stamp(begin_.load()); }
+  Stamp end() const { return Stamp(end_.load()); }
   bool begun() const { return begin_ != 0; }
-  bool done() const { return done_; }
+  bool done() const { return end_ != 0; }
 
  private:
   std::atomic<std::int64_t> begin_{0};
-  std::atomic<bool> done_{false};
+  std::atomic<std::int64_t> end_{0};
   std::thread thread_;
 };
 
@@ -66,9 +67,6 @@ class Pilot {
   bool busWorks() const;
   SafetyState state() const { return bridge->status().state; }
 
-  /// Longest that a tick came late since the last call [s]: the machine's fault, not the bridge's.
-  double takeWorstDelay();
-
   std::unique_ptr<can::SocketCanBus> bus;
   std::unique_ptr<CanBridge> bridge;
   Stamp stopped_at{};  ///< the tick that stopped
@@ -79,7 +77,6 @@ class Pilot {
   void step();
 
   Stamp next_tick_, next_command_;
-  double worst_delay_ = 0.0;
   std::uint32_t sequence_ = 0;
   SafetyState last_state_ = SafetyState::kInit;
 };
