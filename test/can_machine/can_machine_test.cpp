@@ -8,6 +8,7 @@
 #include <random>
 #include <set>
 
+#include "options.h"
 #include "rig.h"
 #include "tunnel_pilot/can/layout.h"
 
@@ -21,20 +22,6 @@ constexpr double kRecoveryLimit = 0.250;  // [s] from the bus's return to a conf
 constexpr double kOutageLimit = 0.500;  // [s] from a fault to a confirmed frame, where the helper helps
 constexpr double kAgeLimit = 0.060;     // [s] of what a frame tells, when it comes
 constexpr double kLongestAct = 0.001;   // [s] that a fault may come later than it was asked for
-
-/// A number that scripts/can_machine hands over.
-long option(const char* name, long otherwise) {
-  const char* value = std::getenv(name);
-  return value == nullptr || *value == '\0' ? otherwise : std::strtol(value, nullptr, 10);
-}
-
-/// How often a fault is provoked: as often as was asked for, else by the set that is run.
-int times(int few, int many) {
-  const bool is_long = option("CAN_MACHINE_LONG", 0) == 1;
-  return static_cast<int>(option("CAN_MACHINE_CYCLES", is_long ? many : few));
-}
-
-std::uint32_t seed() { return static_cast<std::uint32_t>(option("CAN_MACHINE_SEED", 1)); }
 
 /// Worst figures of one kind of fault: a line of the table.
 struct Row {
