@@ -1,6 +1,7 @@
 // Random faults of the kernel's CAN, one after the other and into each other, in whatever state the
-// bridge is. Judged here by what must hold after them, and as a whole by the monitor of
-// test/bus_monitor, from what can2 recorded.
+// bridge is. It must never be armed by itself, and be fit to drive again after each. The monitor of
+// test/bus_monitor cannot judge these logs: the emulated bus takes no time, and its controllers lose and
+// hold up frames when many come at once.
 #include <gtest/gtest.h>
 #include <linux/can/raw.h>
 #include <net/if.h>
@@ -12,11 +13,8 @@
 #include <random>
 
 #include "options.h"
-#include "recorder.h"
 #include "rig.h"
 #include "tunnel_pilot/can/layout.h"
-#include "tunnel_pilot/can/linux_frame.h"
-#include "tunnel_pilot/can/log_writer.h"
 
 namespace tunnel_pilot::bridge {
 namespace {
@@ -54,25 +52,7 @@ class CanMachineCampaign : public testing::Test {
     int count;
   };
 
-  /// The emulated bus takes no time, and three controllers on one processor then lose and hold up frames
-  /// when many come at once: frames are let out as 500 kbit/s would.
-  CanMachineCampaign() {
-    cleanLinks();
-    for (const char* interface : {"can0", "can1"}) shape(interface, "");
-  }
-  void TearDown() override {
-    for (const std::string interface : {"can0", "can1"})
-      tunnel_pilot::bridge::run("/sbin/tc qdisc del dev " + interface + " root");
-  }
-  static void shape(const std::string& interface, const std::string& how) {
-    tunnel_pilot::bridge::run("/sbin/tc qdisc replace dev " + interface +
-                              " root netem limit 10 rate 500kbit " + how);
-  }
-
-  void SetUp() override {
-    pilot.event = [this](const std::string& words, Stamp at) { recorder.event(words, at); };
-    recorder.event("start", steadyTime());
-  }
+  CanMachineCampaign() { cleanLinks(); }
 
   double random(double low, double high) { return std::uniform_real_distribution<>(low, high)(engine); }
   int random(int below) { return static_cast<int>(engine() % static_cast<unsigned>(below)); }
@@ -136,7 +116,6 @@ class CanMachineCampaign : public testing::Test {
     static const std::array<std::uint32_t, 3> kIds{can::kTpCommandId, can::kTpCommandInfoId,
                                                    can::kTpStatusId};
     const can_frame frame = frameOf(kIds[static_cast<std::size_t>(random(3))]);
-    recorder.event("foreign " + can::toText(*can::fromLinux(frame)), steadyTime());
     say(either(), {frame});
   }
   void corrupt() {
@@ -162,10 +141,10 @@ class CanMachineCampaign : public testing::Test {
   void badWire() {
     static const std::array<const char*, 5> kHow{"loss 30%", "delay 20ms 20ms", "duplicate 30%",
                                                  "corrupt 30%", "delay 10ms reorder 50%"};
-    inject([how = kHow[static_cast<std::size_t>(random(5))], seconds = random(0.02, 0.3)] {
-      shape("can1", how);
+    inject([how = std::string(kHow[static_cast<std::size_t>(random(5))]), seconds = random(0.02, 0.3)] {
+      tunnel_pilot::bridge::run("/sbin/tc qdisc replace dev can1 root netem limit 10 " + how);
       wait(seconds);
-      shape("can1", "");
+      tunnel_pilot::bridge::run("/sbin/tc qdisc del dev can1 root");
     });
   }
 
@@ -180,7 +159,6 @@ class CanMachineCampaign : public testing::Test {
                               {"corrupt frames of the truck", &CanMachineCampaign::corrupt, 0},
                               {"strangers' frames", &CanMachineCampaign::flood, 0},
                               {"lossy wire of the truck", &CanMachineCampaign::badWire, 0}}};
-  Recorder recorder;
   Truck truck;
   Pilot pilot;
   std::minstd_rand engine{seed()};
@@ -207,7 +185,6 @@ TEST_F(CanMachineCampaign, RandomFaults) {
   std::string list;
   for (const Kind& kind : kinds) list += ", " + std::to_string(kind.count) + " " + kind.name;
   std::printf("TABLE random faults: %d, %d of them while ACTIVE%s\n", many, driving, list.c_str());
-  recorder.handOver("campaign", "plain");
 }
 
 }  // namespace
