@@ -8,6 +8,7 @@
 #include <random>
 #include <set>
 
+#include "options.h"
 #include "rig.h"
 #include "tunnel_pilot/can/layout.h"
 
@@ -20,24 +21,17 @@ constexpr double kStopLimit = 0.060;      // [s] from the fault
 constexpr double kRecoveryLimit = 0.250;  // [s] from the bus's return to a confirmed frame
 constexpr double kOutageLimit = 0.500;  // [s] from a fault to a confirmed frame, where the helper helps
 constexpr double kAgeLimit = 0.060;     // [s] of what a frame tells, when it comes
-
-bool isLong() {
-  const char* value = std::getenv("CAN_MACHINE_LONG");
-  return value != nullptr && std::string(value) == "1";
-}
+constexpr double kLongestAct = 0.001;   // [s] that a fault may come later than it was asked for
 
 /// Worst figures of one kind of fault: a line of the table.
 struct Row {
   int count = 0;
-  int by_feedback = 0;    ///< stops that the truck's late frames made
   double stop = 0.0;      ///< [s]
   double recovery = 0.0;  ///< [s]
   double age = 0.0;       ///< [s]
-  double delay = 0.0;     ///< [s]
   void print(const std::string& name) const {
-    EXPECT_LE(2 * by_feedback, count) << "not the fault that was provoked";
-    std::printf("TABLE | %s | %d | %.1f | %.1f | %.0f | %.1f |\n", name.c_str(), count, 1e3 * stop,
-                1e3 * recovery, 1e3 * age, 1e3 * delay);
+    std::printf("TABLE | %s | %d | %.1f | %.1f | %.0f |\n", name.c_str(), count, 1e3 * stop,
+                1e3 * recovery, 1e3 * age);
   }
 };
 
@@ -46,33 +40,26 @@ class CanMachine : public testing::Test {
   static void SetUpTestSuite() {
     std::printf(
         "TABLE | fault | times | STOP after [ms] | confirmed again after [ms] | "
-        "oldest frame [ms] | machine held up [ms] |\nTABLE |---|---|---|---|---|---|\n");
+        "oldest frame [ms] |\nTABLE |---|---|---|---|---|\n");
   }
 
-  /// Provokes a fault while driving; the stop, and the time it took less what the machine was held up.
-  void expectStop(const std::function<void()>& fault) {
+  /// Provokes a fault while driving: it stops in time, and for that reason.
+  /// `deafens`: no frame of the truck's comes any more either, which may be seen first.
+  void expectStop(const std::function<void()>& fault, bool deafens = false) {
     ASSERT_TRUE(pilot->drive()) << toString(pilot->state()) << " " << pilot->bus->trouble();
     pilot->run(0.001 * static_cast<double>(random() % 20));
-    ASSERT_TRUE(pilot->drive()) << "held up before the fault";
     truck.takeWorstAge();
-    pilot->takeWorstDelay();
     pilot->stopped_at = Stamp{};
     const Injection injection(fault);
-    fault_at = Stamp{};
     ASSERT_TRUE(pilot->run(2.0, [&] { return pilot->stopped_at != Stamp{} && injection.done(); }));
     fault_at = injection.begin();
-    const double delay = pilot->takeWorstDelay();
     const double stop = toSeconds(pilot->stopped_at - fault_at);
-    EXPECT_LE(stop, kStopLimit + delay);
-    // Where the machine held the truck up meanwhile, its frames were late, too, and that came first.
+    EXPECT_LE(stop, kStopLimit + std::min(toSeconds(injection.end() - fault_at), kLongestAct));
     const supervision::Reason reason = pilot->bridge->status().reason;
-    if (reason == supervision::Reason::kFeedbackStale) {
-      ++row.by_feedback;
-    } else {
-      EXPECT_EQ(reason, supervision::Reason::kBusFault) << supervision::toString(reason);
-    }
+    EXPECT_TRUE(reason == supervision::Reason::kBusFault ||
+                (deafens && reason == supervision::Reason::kFeedbackStale))
+        << supervision::toString(reason);
     row.stop = std::max(row.stop, stop);
-    row.delay = std::max(row.delay, delay);
     ++row.count;
   }
 
@@ -83,48 +70,36 @@ class CanMachine : public testing::Test {
       return pilot->busWorks() && pilot->bus->confirmed() > confirmed;
     })) << pilot->bus->trouble();
     const double recovery = toSeconds(steadyTime() - back);
-    const double delay = pilot->takeWorstDelay();
-    EXPECT_LE(recovery, limit + delay);
+    EXPECT_LE(recovery, limit);
     row.recovery = std::max(row.recovery, recovery);
-    row.delay = std::max(row.delay, delay);
     EXPECT_TRUE(pilot->run(3.0, [&] { return pilot->state() == SafetyState::kStopped; }));
     pilot->run(0.3);
     EXPECT_EQ(pilot->state(), SafetyState::kStopped);
     EXPECT_FALSE(pilot->armed_by_itself);
     row.age = std::max(row.age, truck.takeWorstAge());
-    EXPECT_LE(row.age, kAgeLimit + pilot->takeWorstDelay() + row.delay) << "a stale frame";
+    EXPECT_LE(row.age, kAgeLimit) << "a stale frame";
   }
-
-  int times(int few, int many) const { return isLong() ? many : few; }
 
   Truck truck;
   std::unique_ptr<Pilot> pilot = std::make_unique<Pilot>();
-  std::minstd_rand random{1};
+  std::minstd_rand random{seed()};
   Stamp fault_at{};
   Row row;
 };
 
 TEST_F(CanMachine, DrivesWithEveryFrameConfirmed) {
-  std::uint64_t unsettled = 1, late = 1;
-  for (int tries = 0; tries < 4 && unsettled + late > 0; ++tries) {
-    ASSERT_TRUE(pilot->drive()) << toString(pilot->state()) << " " << pilot->bus->trouble();
-    truck.takeWorstAge();
-    pilot->takeWorstDelay();
-    const std::uint64_t sent = pilot->bridge->status().frames_sent - pilot->bus->inFlight();
-    const std::uint64_t confirmed = pilot->bus->confirmed();
-    const std::uint64_t late_before = pilot->bus->late();
-    pilot->run(times(3, 60));
-    row.age = truck.takeWorstAge();
-    row.delay = pilot->takeWorstDelay();
-    late = pilot->bus->late() - late_before;
-    unsettled = pilot->bridge->status().frames_sent - sent - (pilot->bus->confirmed() - confirmed) -
-                pilot->bus->inFlight();
-    if (row.delay < 0.030) break;  // else the machine stood still, which is no fair drive: again
-  }
+  ASSERT_TRUE(pilot->drive()) << toString(pilot->state()) << " " << pilot->bus->trouble();
+  truck.takeWorstAge();
+  const std::uint64_t sent = pilot->bridge->status().frames_sent - pilot->bus->inFlight();
+  const std::uint64_t confirmed = pilot->bus->confirmed();
+  const std::uint64_t late = pilot->bus->late();
+  pilot->run(times(3, 60));
+  row.age = truck.takeWorstAge();
+  EXPECT_EQ(pilot->bridge->status().frames_sent - sent,
+            pilot->bus->confirmed() - confirmed + pilot->bus->inFlight());
+  EXPECT_EQ(pilot->bus->late(), late);
   EXPECT_EQ(pilot->state(), SafetyState::kActive)
       << supervision::toString(pilot->bridge->status().reason);
-  EXPECT_EQ(unsettled, 0u);
-  EXPECT_EQ(late, 0u);
   row.print("none");
 }
 
@@ -146,7 +121,7 @@ TEST_F(CanMachine, StalledQueue) {
 
 TEST_F(CanMachine, HungController) {
   for (int i = 0; i < times(4, 200) && !HasFatalFailure(); ++i) {
-    expectStop([] { hangController("can0"); });
+    expectStop([] { hangController("can0"); }, true);
     if (!HasFatalFailure()) expectRecovery(fault_at, kOutageLimit);
   }
   row.print("hung controller (likewise)");
@@ -179,7 +154,6 @@ TEST_F(CanMachine, UnpluggedAndBack) {
         << pilot->bus->trouble();
     const Injection configured([] { configure("can0"); });
     ASSERT_TRUE(pilot->run(5.0, [&] { return configured.done(); }));
-    pilot->takeWorstDelay();
     const Injection up([] { setLink("can0", true); });
     while (!up.begun()) pilot->run(0.005);
     expectRecovery(up.begin(), kRecoveryLimit);
@@ -271,7 +245,7 @@ TEST_F(CanMachine, AForeignFrameFromAnotherProgramOfTheMachineStops) {
 
 TEST_F(CanMachine, DoesNotUseAControllerThatRestartsItself) {
   setLink("can0", false);
-  ASSERT_EQ(std::system("ip link set can0 type can restart-ms 100"), 0);
+  ASSERT_EQ(std::system("/sbin/ip link set can0 type can restart-ms 100"), 0);
   setLink("can0", true);
   pilot = std::make_unique<Pilot>();
   EXPECT_FALSE(pilot->busWorks());
@@ -307,10 +281,10 @@ TEST(CanMachineFilters, LetThroughTheListAlone) {
     if (sent % 8 == 0) listen();
   };
   for (std::uint32_t id = 0; id < 0x800; ++id) say(id, false);
-  std::minstd_rand random(1);
-  const int many = isLong() ? 1000000 : 2000;
+  std::minstd_rand random(seed());
+  const long many = times(2000, 1000000);
   for (const can::Identifier& own : allIdentifiers()) say(own.id, true);
-  for (int i = 0; i < many; ++i) say(static_cast<std::uint32_t>(random()) & 0x1FFFFFFF, true);
+  for (long i = 0; i < many; ++i) say(static_cast<std::uint32_t>(random()) & 0x1FFFFFFF, true);
   usleep(200000);
   listen();
   std::set<std::uint32_t> expected;

@@ -26,8 +26,9 @@ config::Node file(const std::string& name) {
   return config::loadFile(std::string(TUNNEL_PILOT_SOURCE_DIR) + "/config/" + name);
 }
 
-std::unique_ptr<can::SocketCanBus> join(const std::string& interface, const std::string& helper) {
-  return std::make_unique<can::SocketCanBus>(interface, allIdentifiers(),
+std::unique_ptr<can::SocketCanBus> join(const std::string& interface, const std::string& helper,
+                                        const can::Profile& profile) {
+  return std::make_unique<can::SocketCanBus>(interface, can::identifiersOf(profile),
                                              can::openCanSocket(interface, helper));
 }
 
@@ -45,15 +46,21 @@ void writeTo(const std::string& path, const std::string& text) {
 
 Stamp steadyTime() { return Stamp(std::chrono::steady_clock::now().time_since_epoch()); }
 
+can::Profile profileOf(can::Side side, can::ProfileKind kind) {
+  can::Profile profile = side == can::Side::kPilot
+                             ? loadBridge(file("can_bridge.yaml")).can
+                             : simulation::loadTruckController(file("truck_controller.yaml")).can;
+  profile.kind = kind;
+  return profile;
+}
+
 std::vector<can::Identifier> allIdentifiers() {
-  std::vector<can::Identifier> identifiers;
-  for (const can::FrameLayout& layout : can::frameLayouts()) identifiers.push_back({layout.id, false});
-  return identifiers;
+  return can::identifiersOf(profileOf(can::Side::kPilot, can::ProfileKind::kPlain));
 }
 
 // -------- Truck
 
-Truck::Truck() : thread_([this] { run(); }) {}
+Truck::Truck(can::ProfileKind kind) : kind_(kind), thread_([this] { run(); }) {}
 
 Truck::~Truck() {
   ends_ = true;
@@ -63,8 +70,10 @@ Truck::~Truck() {
 double Truck::takeWorstAge() { return 1e-3 * static_cast<double>(worst_age_ms_.exchange(0)); }
 
 void Truck::run() {
-  const auto bus = join("can1", TUNNEL_PILOT_NODE_FOLDER "/can_link_cycle");
-  const auto listener = join("can1", "");
+  const can::Profile profile = profileOf(can::Side::kTruck, kind_);
+  const auto bus =
+      can::withProfile(profile, join("can1", TUNNEL_PILOT_NODE_FOLDER "/can_link_cycle", profile));
+  const auto listener = can::withProfile(profile, join("can1", "", profile));
   simulation::TruckController controller(simulation::loadTruckController(file("truck_controller.yaml")),
                                          *bus);
   const simulation::SensedTruck standing;
@@ -72,7 +81,7 @@ void Truck::run() {
     sleepUntil(next);
     const Stamp now = steadyTime();
     controller.step(standing, now);
-    if (bus->state() == can::BusState::kDown) bus->discard();
+    if (bus->state() == can::BusState::kDown || bus->state() == can::BusState::kBusOff) bus->discard();
     while (const auto frame = listener->receive()) judge(*frame, now);
     next = std::max(next, now - milliseconds(2));
   }
@@ -92,15 +101,19 @@ Injection::Injection(const std::function<void()>& act)
     : thread_([this, act] {
         begin_ = steadyTime().count();
         act();
-        done_ = true;
+        end_ = steadyTime().count();
       }) {}
 
 // -------- Pilot
 
-Pilot::Pilot(const std::string& helper)
-    : bus(join("can0", helper)), next_tick_(steadyTime()), next_command_(next_tick_) {
+Pilot::Pilot(const std::string& helper, can::ProfileKind kind)
+    : next_tick_(steadyTime()), next_command_(next_tick_) {
+  const can::Profile profile = profileOf(can::Side::kPilot, kind);
+  auto socket = join("can0", helper, profile);
+  bus = socket.get();
+  network = can::withProfile(profile, std::move(socket));
   bridge = std::make_unique<CanBridge>(loadBridge(file("can_bridge.yaml")),
-                                       vehicle::loadTruck(file("truck.yaml")).geometry, *bus);
+                                       vehicle::loadTruck(file("truck.yaml")).geometry, *network);
 }
 
 bool Pilot::run(double seconds, const std::function<bool()>& until) {
@@ -115,7 +128,6 @@ bool Pilot::run(double seconds, const std::function<bool()>& until) {
 void Pilot::step() {
   sleepUntil(next_tick_);
   const Stamp now = steadyTime();
-  worst_delay_ = std::max(worst_delay_, toSeconds(now - next_tick_));
   next_tick_ = std::max(next_tick_ + kTick, now);
   if (now >= next_command_) {
     next_command_ = std::max(next_command_ + kCommandPeriod, now);
@@ -125,9 +137,18 @@ void Pilot::step() {
     command.mode = supervision::Mode::kAutonomous;
     command.source = supervision::Source::kPreviewDriver;
     command.acceleration = 0.5;
+    event("measurement preview_driver 0", now);
     bridge->setCommand(command, now);
   }
   bridge->tick(now);
+  look(now);
+}
+
+void Pilot::look(Stamp now) {
+  // The bus beneath: under J1939 the address comes on top.
+  const bool works = bus->state() != can::BusState::kDown && bus->state() != can::BusState::kBusOff;
+  if (works != bus_worked_) event(works ? "bus up" : "bus down", now);
+  bus_worked_ = works;
   if (isStop(state()) && !isStop(last_state_))
     stopped_at = now;  // a truck that stands is STOPPED at once
   if (isEngaged(state()) && !engaged_by_us) armed_by_itself = true;
@@ -138,22 +159,27 @@ void Pilot::step() {
 bool Pilot::drive() {
   const Stamp end = steadyTime() + std::chrono::seconds(10);
   while (steadyTime() < end && state() != SafetyState::kActive) {
-    if (state() == SafetyState::kStopped) bridge->reset(steadyTime());
-    if (state() == SafetyState::kStandby && bridge->engage(steadyTime()).accepted) engaged_by_us = true;
+    sleepUntil(next_tick_);  // by then the frames of the tick before are out
+    const Stamp now = steadyTime();
+    if (state() == SafetyState::kStopped && bridge->reset(now).accepted) event("reset", now);
+    if (state() == SafetyState::kStandby && bridge->engage(now).accepted) {
+      engaged_by_us = true;
+      event("engage", now);
+    }
     step();
   }
   return state() == SafetyState::kActive;
 }
 
 bool Pilot::busWorks() const {
-  return bus->state() != can::BusState::kDown && bus->state() != can::BusState::kBusOff;
+  return network->state() != can::BusState::kDown && network->state() != can::BusState::kBusOff;
 }
-
-double Pilot::takeWorstDelay() { return std::exchange(worst_delay_, 0.0); }
 
 // -------- faults
 
-void provoke(const std::string& word) { writeTo("/sys/kernel/debug/can_fault", "can0 " + word); }
+void provoke(const std::string& word, const std::string& interface) {
+  writeTo("/sys/kernel/debug/can_fault", interface + " " + word);
+}
 
 void setLink(const std::string& interface, bool up) {
   const int number = socket(PF_CAN, SOCK_RAW, 1);
@@ -166,9 +192,19 @@ void setLink(const std::string& interface, bool up) {
   if (!good) throw std::runtime_error("cannot set " + interface);
 }
 
-void configure(const std::string& interface) {
-  const std::string command = "ip link set " + interface + " type can bitrate 500000 restart-ms 0";
+void run(const std::string& command) {
   if (std::system(command.c_str()) != 0) throw std::runtime_error("failed: " + command);
+}
+
+void configure(const std::string& interface) {
+  run("/sbin/ip link set " + interface + " type can bitrate 500000 restart-ms 0");
+}
+
+void cleanLinks() {
+  for (const char* interface : {"can0", "can1"}) {
+    setLink(interface, false);
+    setLink(interface, true);
+  }
 }
 
 void unplug(const std::string& interface) {

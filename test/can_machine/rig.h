@@ -9,19 +9,23 @@
 #include <vector>
 
 #include "tunnel_pilot/bridge/can_bridge.h"
+#include "tunnel_pilot/can/profile.h"
 #include "tunnel_pilot/can/socket_can_bus.h"
 
 namespace tunnel_pilot::bridge {
 
 Stamp steadyTime();
 
-std::vector<can::Identifier> allIdentifiers();
+/// Who the two sides are on a bus of this kind, by the shipped files.
+can::Profile profileOf(can::Side side, can::ProfileKind kind);
+
+std::vector<can::Identifier> allIdentifiers();  ///< of the plain profile
 
 /// A truck's controller with a truck that stands, on can1, in a thread of its own, that also judges what
 /// it hears of the bridge.
 class Truck {
  public:
-  Truck();
+  explicit Truck(can::ProfileKind kind = can::ProfileKind::kPlain);
   ~Truck();
 
   /// Oldest measurement that a frame of the bridge told of when it came, since the last call [s].
@@ -31,6 +35,7 @@ class Truck {
   void run();
   void judge(const can::Frame& frame, Stamp now);
 
+  can::ProfileKind kind_;
   std::atomic<bool> ends_{false};
   std::atomic<std::int64_t> worst_age_ms_{0};
   std::thread thread_;
@@ -42,19 +47,21 @@ class Injection {
   explicit Injection(const std::function<void()>& act);
   ~Injection() { thread_.join(); }
   Stamp begin() const { return Stamp(begin_.load()); }
+  Stamp end() const { return Stamp(end_.load()); }
   bool begun() const { return begin_ != 0; }
-  bool done() const { return done_; }
+  bool done() const { return end_ != 0; }
 
  private:
   std::atomic<std::int64_t> begin_{0};
-  std::atomic<bool> done_{false};
+  std::atomic<std::int64_t> end_{0};
   std::thread thread_;
 };
 
 /// Arbiter and bridge on can0, ticked every 5 ms of steady time.
 class Pilot {
  public:
-  explicit Pilot(const std::string& helper = TUNNEL_PILOT_NODE_FOLDER "/can_link_cycle");
+  explicit Pilot(const std::string& helper = TUNNEL_PILOT_NODE_FOLDER "/can_link_cycle",
+                 can::ProfileKind kind = can::ProfileKind::kPlain);
 
   /// Ticks for a time [s], or until something is so. False when it never was.
   bool run(
@@ -66,31 +73,36 @@ class Pilot {
   bool busWorks() const;
   SafetyState state() const { return bridge->status().state; }
 
-  /// Longest that a tick came late since the last call [s]: the machine's fault, not the bridge's.
-  double takeWorstDelay();
-
-  std::unique_ptr<can::SocketCanBus> bus;
+  can::SocketCanBus* bus = nullptr;   ///< beneath `network`, or the same
+  std::unique_ptr<can::Bus> network;  ///< as the bridge has it
   std::unique_ptr<CanBridge> bridge;
   Stamp stopped_at{};  ///< the tick that stopped
   bool engaged_by_us = false;
   bool armed_by_itself = false;
 
+  /// Is told of what the log of events holds.
+  std::function<void(const std::string&, Stamp)> event = [](const std::string&, Stamp) {};
+
  private:
   void step();
+  void look(Stamp now);
 
   Stamp next_tick_, next_command_;
-  double worst_delay_ = 0.0;
   std::uint32_t sequence_ = 0;
   SafetyState last_state_ = SafetyState::kInit;
+  bool bus_worked_ = true;
 };
 
 // -------- faults of an interface
 
-void provoke(const std::string& word);  ///< by the module can_fault, on can0
+void provoke(const std::string& word,
+             const std::string& interface = "can0");  ///< by the module can_fault
 void setLink(const std::string& interface, bool up);
+void cleanLinks();                             ///< nothing is left in the queues of both sides
 void configure(const std::string& interface);  ///< bit rate, restart-ms 0; leaves it down
 void unplug(const std::string& interface);
 void rescan();
 void hangController(const std::string& interface);  ///< masks its interrupts
+void run(const std::string& command);               ///< of a shell; throws when it fails
 
 }  // namespace tunnel_pilot::bridge
