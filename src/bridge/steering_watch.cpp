@@ -18,7 +18,7 @@ void SteeringResponse::reset(double angle, Stamp now) {
 
 double SteeringResponse::step(double sent, Stamp now) {
   if (sent_.empty() || sent_.back().angle != sent) sent_.push_back({now, sent});
-  while (!sent_.empty() && sent_.front().stamp + dead_time_ <= now) {
+  while (sent_.front().stamp + dead_time_ <= now) {
     demand_ = sent_.front().angle;
     // The newest stays, so that an unchanged angle is not stored again and again.
     if (sent_.size() == 1) break;

@@ -226,6 +226,67 @@ TEST(TransmitWatch, TheAgeIsThatOfTheOldestFrameInFlight) {
   EXPECT_FALSE(watch.stalled());
 }
 
+TEST(TransmitWatch, AThirdSetIsNotTakenIn) {
+  TransmitWatch watch;
+  watch.sent(3, ms(0));
+  watch.sent(3, ms(10));
+  watch.sent(3, ms(20));
+  watch.update(3, ms(30));
+  EXPECT_FALSE(watch.full());
+  watch.update(0, ms(100));
+  EXPECT_FALSE(watch.stalled());
+  watch.sent(3, ms(100));
+  watch.update(3, ms(134));
+  EXPECT_FALSE(watch.stalled());
+}
+
+TEST(TransmitWatch, StallsWhenTheOldestFrameIs35MillisecondsOld) {
+  TransmitWatch watch;
+  watch.sent(1, ms(0));
+  watch.update(1, ms(34));
+  EXPECT_FALSE(watch.stalled());
+  watch.update(1, ms(35));
+  EXPECT_TRUE(watch.stalled());
+}
+
+TEST(TransmitWatch, SetsOfDifferentSizesAreSettledInTheirOrder) {
+  TransmitWatch watch;
+  watch.sent(1, ms(0));
+  watch.sent(3, ms(20));
+  watch.update(4, ms(34));
+  EXPECT_TRUE(watch.full());
+  watch.update(3, ms(54));
+  EXPECT_FALSE(watch.full());
+  EXPECT_FALSE(watch.stalled());
+  watch.update(1, ms(55));
+  EXPECT_TRUE(watch.stalled()) << "the last frame of the second set";
+  watch.sent(2, ms(56));
+  watch.update(2, ms(57));
+  EXPECT_FALSE(watch.stalled());
+  EXPECT_FALSE(watch.full());
+}
+
+TEST(TransmitWatch, FramesInFlightThatItDoesNotKnowOfSettleNothing) {
+  TransmitWatch watch;
+  watch.sent(3, ms(0));
+  watch.update(5, ms(10));
+  watch.update(3, ms(35));
+  EXPECT_TRUE(watch.stalled());
+}
+
+TEST(TransmitWatch, AfterAClockThatJumpedAgesBeginAnew) {
+  TransmitWatch watch;
+  watch.sent(3, ms(0));
+  watch.sent(3, ms(10));
+  watch.forgetTime(ms(5000));
+  watch.update(6, ms(5034));
+  EXPECT_FALSE(watch.stalled());
+  watch.update(6, ms(5035));
+  EXPECT_TRUE(watch.stalled());
+  watch.update(3, ms(5036));
+  EXPECT_TRUE(watch.stalled()) << "of the second set as well";
+}
+
 TEST(TransmitWatch, ASetOfWhichNothingWasTakenIsNotOnItsWay) {
   TransmitWatch watch;
   watch.sent(0, ms(0));
