@@ -290,7 +290,8 @@ TEST(SteeringResponse, EachAngleActsInItsTurn) {
   response.reset(0.0, ms(0));
   for (int i = 0; i < 100; ++i) {
     const double angle = response.step(0.01 * (i / 10), ms(10 * i));
-    if (i >= 15 && i % 10 == 5) EXPECT_NEAR(angle, 0.01 * ((i - 15) / 10), 1e-4) << i;
+    if (i < 15 || i % 10 != 5) continue;
+    EXPECT_NEAR(angle, 0.01 * ((i - 15) / 10), 1e-4) << i;
   }
 }
 
@@ -451,7 +452,7 @@ TEST(CommandSender, ASetThatCannotBeEncodedFailsAndNothingOfItIsSent) {
   const auto bus = hub.connect(), wire = hub.connect();
   CommandSender sender(0.02);
   can::TruckCommandFrame impossible;
-  impossible.speed = -1.0;
+  impossible.speed = std::nan("");
   sender.send(impossible, {}, {}, *bus, ms(0));
   EXPECT_EQ(sender.setsFailed(), 1u);
   EXPECT_EQ(sender.framesSent(), 0u);

@@ -88,6 +88,19 @@ TEST(CommandLimiter, LateralAccelerationIsLimitedWithTheHigherOfBothSpeeds) {
   EXPECT_FALSE(slow.limit({widest + 0.004, 2.0, 2.0, false}, kCycle).fired.lateral_acceleration);
 }
 
+TEST(CommandLimiter, WhereNoSpeedIsMeasuredTheCommandedOneCounts) {
+  const double widest = vehicle::steadyArticulation(truck(), 2.0 / 64.0);
+  CommandLimiter fast = at(widest, 8.0);
+  EXPECT_DOUBLE_EQ(fast.limit({widest + 0.004, 8.0, kNaN, false}, kCycle).articulation, widest);
+  CommandLimiterParameters low = kLimits;
+  low.max_lateral_acceleration = 0.1;
+  CommandLimiter standing(low, truck());
+  standing.start(0.7, 0.0);
+  EXPECT_EQ(standing.limit({0.7, 0.0, kNaN, false}, kCycle).articulation, 0.7);
+  EXPECT_LT(standing.limit({0.7, 0.0, 0.9, false}, kCycle).articulation, 0.7)
+      << "slow, but not standing";
+}
+
 TEST(CommandLimiter, SpeedIsLoweredForTheBendThatIsAlreadySteered) {
   CommandLimiter limiter = at(0.5, 3.0);
   CommandLimiter::Result result;
@@ -207,7 +220,9 @@ TEST(CommandLimiter, ASpeedOutsideItsRangeIsFlagged) {
 }
 
 TEST(CommandLimiter, ASpeedThatIsNoNumberIsFlagged) {
-  EXPECT_TRUE(at(0.0, 2.0).limit({0.0, kNaN, 2.0, false}, kCycle).fired.not_finite);
+  const CommandLimiter::Flags fired = at(0.0, 2.0).limit({0.0, kNaN, 2.0, false}, kCycle).fired;
+  EXPECT_TRUE(fired.not_finite);
+  EXPECT_FALSE(fired.speed);
 }
 
 TEST(CommandLimiter, TheBendsSpeedIsThatOfItsLateralAcceleration) {
@@ -247,6 +262,17 @@ TEST(CommandLimiter, TheJerksLimitIsFlaggedOnlyWhereItIsReached) {
   EXPECT_FALSE(at(0.0, 2.0).limit({0.0, 2.0 + 0.99 * step, 2.0, false}, kCycle).fired.jerk);
   EXPECT_TRUE(at(0.0, 2.0).limit({0.0, 2.0 - 1.01 * step, 2.0, false}, kCycle).fired.jerk);
   EXPECT_FALSE(at(0.0, 2.0).limit({0.0, 2.0 - 0.99 * step, 2.0, false}, kCycle).fired.jerk);
+}
+
+TEST(CommandLimiter, LandsOnItsSpeedAsTheJerkAllows) {
+  for (const double sign : {1.0, -1.0}) {
+    CommandLimiter limiter = at(0.0, 2.0);
+    const double speed = limiter.limit({0.0, 2.0 + sign, 2.0, false}, kCycle).speed;
+    const double landing = std::sqrt(2.0 * 3.0 * 0.004) - 3.0 * kCycle;
+    const CommandLimiter::Result result = limiter.limit({0.0, speed + sign * 0.004, 2.0, false}, kCycle);
+    EXPECT_NEAR(result.speed - speed, sign * landing * kCycle, 1e-12);
+    EXPECT_TRUE(result.fired.jerk);
+  }
 }
 
 // -------- parameters
