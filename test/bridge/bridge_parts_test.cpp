@@ -11,6 +11,7 @@
 #include "tunnel_pilot/bridge/heartbeat_watch.h"
 #include "tunnel_pilot/bridge/odometry.h"
 #include "tunnel_pilot/bridge/steering_watch.h"
+#include "tunnel_pilot/bridge/transmit_watch.h"
 #include "tunnel_pilot/bridge/truck_link.h"
 #include "tunnel_pilot/can/memory_bus.h"
 #include "tunnel_pilot/config/node.h"
@@ -405,6 +406,102 @@ TEST(SteeringWatch, ForgivesAnErrorThatPasses) {
     watch.step(0.0, (i % 500 < 450 ? 6.0 : 4.0) * kDeg, ms(i));
     ASSERT_FALSE(watch.failed(ms(i))) << i;
   }
+}
+
+// -------- transmission
+
+TEST(TransmitWatch, NeverHasMoreThanTwoSetsOnTheirWay) {
+  TransmitWatch watch;
+  watch.sent(3, ms(0));
+  EXPECT_FALSE(watch.full());
+  watch.sent(3, ms(20));
+  EXPECT_TRUE(watch.full());
+  watch.update(3, ms(21));
+  EXPECT_FALSE(watch.full());
+}
+
+TEST(TransmitWatch, TheAgeIsThatOfTheOldestFrameInFlight) {
+  TransmitWatch watch;
+  watch.sent(3, ms(0));
+  watch.update(1, ms(30));
+  EXPECT_FALSE(watch.stalled());
+  watch.sent(3, ms(30));
+  watch.update(4, ms(35));
+  EXPECT_TRUE(watch.stalled()) << "one frame of the first set";
+  watch.update(3, ms(36));
+  EXPECT_FALSE(watch.stalled());
+  watch.update(3, ms(65));
+  EXPECT_TRUE(watch.stalled());
+  watch.update(0, ms(66));
+  EXPECT_FALSE(watch.stalled());
+}
+
+TEST(TransmitWatch, AThirdSetIsNotTakenIn) {
+  TransmitWatch watch;
+  watch.sent(3, ms(0));
+  watch.sent(3, ms(10));
+  watch.sent(3, ms(20));
+  watch.update(3, ms(30));
+  EXPECT_FALSE(watch.full());
+  watch.update(0, ms(100));
+  EXPECT_FALSE(watch.stalled());
+  watch.sent(3, ms(100));
+  watch.update(3, ms(134));
+  EXPECT_FALSE(watch.stalled());
+}
+
+TEST(TransmitWatch, StallsWhenTheOldestFrameIs35MillisecondsOld) {
+  TransmitWatch watch;
+  watch.sent(1, ms(0));
+  watch.update(1, ms(34));
+  EXPECT_FALSE(watch.stalled());
+  watch.update(1, ms(35));
+  EXPECT_TRUE(watch.stalled());
+}
+
+TEST(TransmitWatch, SetsOfDifferentSizesAreSettledInTheirOrder) {
+  TransmitWatch watch;
+  watch.sent(1, ms(0));
+  watch.sent(3, ms(20));
+  watch.update(4, ms(34));
+  EXPECT_TRUE(watch.full());
+  watch.update(3, ms(54));
+  EXPECT_FALSE(watch.full());
+  EXPECT_FALSE(watch.stalled());
+  watch.update(1, ms(55));
+  EXPECT_TRUE(watch.stalled()) << "the last frame of the second set";
+  watch.sent(2, ms(56));
+  watch.update(2, ms(57));
+  EXPECT_FALSE(watch.stalled());
+  EXPECT_FALSE(watch.full());
+}
+
+TEST(TransmitWatch, FramesInFlightThatItDoesNotKnowOfSettleNothing) {
+  TransmitWatch watch;
+  watch.sent(3, ms(0));
+  watch.update(5, ms(10));
+  watch.update(3, ms(35));
+  EXPECT_TRUE(watch.stalled());
+}
+
+TEST(TransmitWatch, AfterAClockThatJumpedAgesBeginAnew) {
+  TransmitWatch watch;
+  watch.sent(3, ms(0));
+  watch.sent(3, ms(10));
+  watch.forgetTime(ms(5000));
+  watch.update(6, ms(5034));
+  EXPECT_FALSE(watch.stalled());
+  watch.update(6, ms(5035));
+  EXPECT_TRUE(watch.stalled());
+  watch.update(3, ms(5036));
+  EXPECT_TRUE(watch.stalled()) << "of the second set as well";
+}
+
+TEST(TransmitWatch, ASetOfWhichNothingWasTakenIsNotOnItsWay) {
+  TransmitWatch watch;
+  watch.sent(0, ms(0));
+  watch.update(0, ms(100));
+  EXPECT_FALSE(watch.stalled());
 }
 
 // -------- sender
