@@ -18,6 +18,7 @@ using S = SafetyState;
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kMaxFrameAngle = 45.0 * kPi / 180.0;  // the .dbc's range of ArticulationAngle [rad]
 constexpr Stamp kDiscardPeriod = std::chrono::milliseconds(500);  // a bus that stays off is not hurried
+constexpr std::size_t kLongestRejection = 64;                     // kept without an allocation
 constexpr double kRounding = 1e-6;  // beyond a limit, by arithmetic alone [rad], [m/s]
 
 // Reasons with which the arbiter tells that it drives on in less than full health. The others either
@@ -78,11 +79,13 @@ CanBridge::CanBridge(const BridgeParameters& parameters, const vehicle::TruckGeo
       sender_(parameters.frame_period),
       odometry_(truck, parameters.gyro_bias_time, parameters.standstill_speed, parameters.errors,
                 parameters.slip),
-      watch_(parameters.tracking) {}
+      watch_(parameters.tracking) {
+  status_.command_rejection.reserve(kLongestRejection);
+}
 
 // -------- commands and operator
 
-std::string CanBridge::whyRefused(const Command& command, Stamp now) const {
+std::string_view CanBridge::whyRefused(const Command& command, Stamp now) const {
   if (!inside(command.articulation_angle, -max_angle_, max_angle_))
     return "articulation angle out of range";
   if (!inside(command.speed, 0.0, parameters_.max_speed)) return "speed out of range";
@@ -103,7 +106,7 @@ std::uint32_t CanBridge::monotonous(std::uint32_t sequence) {
   return sequence + sequence_offset_;
 }
 
-void CanBridge::rejectCommand(const Command& command, const std::string& why, Stamp now) {
+void CanBridge::rejectCommand(const Command& command, std::string_view why, Stamp now) {
   ++status_.commands_rejected;
   status_.command_rejection = why;
   if (!command.stop) return;
@@ -112,7 +115,7 @@ void CanBridge::rejectCommand(const Command& command, const std::string& why, St
 }
 
 void CanBridge::setCommand(const Command& command, Stamp now) {
-  const std::string why = whyRefused(command, now);
+  const std::string_view why = whyRefused(command, now);
   if (!why.empty()) return rejectCommand(command, why, now);
   const std::uint32_t sequence = monotonous(command.sequence);  // compares with the command before
   command_ = Received{command, now};

@@ -6,7 +6,9 @@
 namespace tunnel_pilot::bridge {
 
 SteeringResponse::SteeringResponse(double dead_time, double rate, double lag)
-    : dead_time_(fromSeconds(dead_time)), rate_(rate), lag_(lag) {}
+    : dead_time_(fromSeconds(dead_time)), rate_(rate), lag_(lag) {
+  sent_.reserve(kReserved);
+}
 
 void SteeringResponse::reset(double angle, Stamp now) {
   sent_.clear();
@@ -16,11 +18,11 @@ void SteeringResponse::reset(double angle, Stamp now) {
 
 double SteeringResponse::step(double sent, Stamp now) {
   if (sent_.empty() || sent_.back().angle != sent) sent_.push_back({now, sent});
-  while (!sent_.empty() && sent_.front().stamp + dead_time_ <= now) {
+  while (sent_.front().stamp + dead_time_ <= now) {
     demand_ = sent_.front().angle;
     // The newest stays, so that an unchanged angle is not stored again and again.
     if (sent_.size() == 1) break;
-    sent_.pop_front();
+    sent_.erase(sent_.begin());
   }
   const double dt = toSeconds(now - last_);
   last_ = now;

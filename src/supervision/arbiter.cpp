@@ -270,33 +270,20 @@ bool Arbiter::waitsForScan(const SourceRule& rule, Stamp now) const {
 // Without a healthy source the truck stops, unless what the sources lack is about to be judged by
 // itself: a late scan or an invalid tunnel, each with its own grace.
 void Arbiter::assessSources(Stamp now, Findings& findings) const {
+  // By Health; of a healthy source there is none.
+  constexpr std::array<Reason, 5> kCauses = {Reason::kStartUp, Reason::kSourceStale,
+                                             Reason::kProposalInvalid, Reason::kNoSource,
+                                             Reason::kLowConfidence};
   if (bestSource(now)) return;
   const bool tunnel_lost = tunnel_received_ && !tunnel_state_.valid;
   Findings causes;
   bool excused = false;
   for (const SourceRule& rule : parameters_.sources) {
     if (!rule.steers) continue;
-    switch (health(rule, now)) {
-      case Health::kNever:
-        causes.stopFor(Reason::kStartUp);
-        break;
-      case Health::kInvalid:
-        causes.stopFor(Reason::kProposalInvalid);
-        break;
-      case Health::kStale:
-        causes.stopFor(Reason::kSourceStale);
-        excused = excused || waitsForScan(rule, now);
-        break;
-      case Health::kUnable:
-        causes.stopFor(Reason::kNoSource);
-        excused = excused || tunnel_lost;
-        break;
-      case Health::kUnsure:
-        causes.stopFor(Reason::kLowConfidence);
-        break;
-      case Health::kHealthy:
-        break;
-    }
+    const Health state = health(rule, now);
+    causes.stopFor(kCauses.at(static_cast<std::size_t>(state)));
+    if (state == Health::kStale) excused = excused || waitsForScan(rule, now);
+    if (state == Health::kUnable) excused = excused || tunnel_lost;
   }
   if (!excused) findings.stopFor(causes.stop);
 }
@@ -344,7 +331,7 @@ Arbiter::Steering Arbiter::chooseSteering(Stamp now) const {
 }
 
 std::optional<geometry::Pose> Arbiter::placeInCenterline(Stamp now) const {
-  if (!centerline_pose_ || profile_.empty()) return std::nullopt;
+  if (!centerline_pose_) return std::nullopt;
   const std::optional<geometry::Pose> here = history_.poseAt(now);
   if (!here) return std::nullopt;
   return centerline_pose_->relative(*here);
@@ -415,8 +402,7 @@ void Arbiter::updateCorridor(double commanded, Stamp now) {
   const drivers::Motion& motion = history_.latest();
   const std::optional<geometry::Pose> scan_pose = history_.poseAt(points_stamp_);
   const std::optional<geometry::Pose> here = history_.poseAt(now);
-  for (FreeWay& free : free_ways_)
-    free.distance -= std::abs(motion.speed) * age(last_ ? last_ : now, now);
+  for (FreeWay& free : free_ways_) free.distance -= std::abs(motion.speed) * age(last_, now);
   if (!complete || !fresh || !scan_pose || !here) return;
   const geometry::Pose path_frame =
       centerline_pose_ ? scan_pose->relative(*centerline_pose_) : geometry::Pose{};

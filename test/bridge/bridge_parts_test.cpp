@@ -11,6 +11,7 @@
 #include "tunnel_pilot/bridge/heartbeat_watch.h"
 #include "tunnel_pilot/bridge/odometry.h"
 #include "tunnel_pilot/bridge/steering_watch.h"
+#include "tunnel_pilot/bridge/transmit_watch.h"
 #include "tunnel_pilot/bridge/truck_link.h"
 #include "tunnel_pilot/can/memory_bus.h"
 #include "tunnel_pilot/config/node.h"
@@ -95,6 +96,18 @@ TEST(HeartbeatWatch, OthersDoNotCount) {
   watch.heard("/stranger", ms(0));
   EXPECT_EQ(watch.silent(ms(1)), "/arbiter");
   EXPECT_FALSE(HeartbeatWatch({}, 0.06).silent(ms(1)));
+}
+
+TEST(BridgeParameters, AHeartbeatsNodeHasANodesName) {
+  YAML::Node yaml = YAML::LoadFile(configFile("can_bridge.yaml"));
+  for (const char* good : {"[arbiter]", "[/arbiter]"}) {
+    yaml["heartbeats"] = YAML::Load(good);
+    EXPECT_NO_THROW(loadBridge(config::Node(yaml, "x"))) << good;
+  }
+  for (const char* bad : {"[1arbiter]", "[_arbiter]"}) {
+    yaml["heartbeats"] = YAML::Load(bad);
+    EXPECT_THROW(loadBridge(config::Node(yaml, "x")), config::ConfigError) << bad;
+  }
 }
 
 // -------- odometry
@@ -261,6 +274,45 @@ TEST(SteeringResponse, HasDeadTimeThenRampThenLag) {
   EXPECT_NEAR(response.step(20.0 * kDeg, ms(5001)), 20.0 * kDeg, 1e-6);
 }
 
+TEST(SteeringResponse, ActsWhenTheDeadTimeIsOver) {
+  for (const double angle : {20.0 * kDeg, -20.0 * kDeg}) {
+    SteeringResponse response(0.15, 15.0 * kDeg, 0.20);
+    response.reset(0.0, ms(0));
+    response.step(angle, ms(10));
+    EXPECT_EQ(response.step(angle, ms(159)), 0.0);
+    // 1 ms of the highest rate, of which the lag lets so much through.
+    const double ramp = std::copysign(15.0 * kDeg * 1e-3, angle);
+    EXPECT_NEAR(response.step(angle, ms(160)), ramp * (1.0 - std::exp(-1e-3 / 0.20)), 1e-15);
+  }
+}
+
+TEST(SteeringResponse, EachAngleActsInItsTurn) {
+  SteeringResponse response(0.15, 100.0, 1e-3);  // no rate, no lag to speak of
+  response.reset(0.0, ms(0));
+  for (int i = 0; i < 100; ++i) {
+    const double angle = response.step(0.01 * (i / 10), ms(10 * i));
+    if (i < 15 || i % 10 != 5) continue;
+    EXPECT_NEAR(angle, 0.01 * ((i - 15) / 10), 1e-4) << i;
+  }
+}
+
+TEST(SteeringResponse, AnAngleThatWasHeldForLongActsAfterTheDeadTimeAsWell) {
+  SteeringResponse response(0.15, 100.0, 1e-3);
+  response.reset(0.0, ms(0));
+  for (int i = 0; i < 100; ++i) response.step(0.1, ms(10 * i));
+  response.step(0.2, ms(1000));
+  EXPECT_NEAR(response.step(0.2, ms(1140)), 0.1, 1e-6);
+  EXPECT_NEAR(response.step(0.2, ms(1160)), 0.2, 1e-3);
+}
+
+TEST(SteeringResponse, AResetForgetsWhatWasSent) {
+  SteeringResponse response(0.15, 15.0 * kDeg, 0.20);
+  response.reset(0.0, ms(0));
+  for (int i = 0; i < 30; ++i) response.step(0.01 * i, ms(10 * i));
+  response.reset(0.3, ms(300));
+  for (int i = 0; i < 30; ++i) EXPECT_EQ(response.step(0.3, ms(310 + 10 * i)), 0.3);
+}
+
 TrackingParameters tracking() {
   return loadBridge(config::loadFile(configFile("can_bridge.yaml"))).tracking;
 }
@@ -290,6 +342,63 @@ TEST(SteeringWatch, FindsAValveThatRunsAway) {
   EXPECT_NEAR(failed_at, 834, 3);  // 5 deg at 333 ms, and 500 ms more
 }
 
+TEST(SteeringWatch, TheErrorIsTheDistanceToWhatIsExpected) {
+  SteeringWatch watch(tracking());
+  watch.reset(0.0, ms(0));
+  EXPECT_EQ(watch.error(), 0.0);
+  watch.step(0.1, 0.3, ms(1));  // between 0, as it was, and 0.1, as it is sent
+  EXPECT_NEAR(watch.error(), 0.2, 1e-12);
+  watch.step(0.1, -0.3, ms(2));
+  EXPECT_NEAR(watch.error(), 0.3, 1e-12);
+  watch.step(0.1, 0.05, ms(3));
+  EXPECT_EQ(watch.error(), 0.0);
+}
+
+TEST(SteeringWatch, ExpectsAnythingBetweenTheSlowestAndTheFastestPump) {
+  SteeringWatch watch(tracking());
+  watch.reset(0.0, ms(0));
+  for (int i = 1; i <= 1000; ++i) watch.step(0.3, 0.1, ms(i));
+  for (int i = 1001; i <= 1100; ++i)
+    watch.step(-0.3, 0.1, ms(i));  // the dead time: both still turn left
+  SteeringResponse fast(0.15, tracking().max_rate, tracking().lag);
+  SteeringResponse slow(0.15, tracking().min_rate, tracking().lag);
+  fast.reset(0.0, ms(0));
+  slow.reset(0.0, ms(0));
+  double high = 0.0, low = 0.0;
+  for (int i = 1; i <= 1000; ++i) high = fast.step(0.3, ms(i)), low = slow.step(0.3, ms(i));
+  for (int i = 1001; i <= 1101; ++i) high = fast.step(-0.3, ms(i)), low = slow.step(-0.3, ms(i));
+  EXPECT_GT(high, low + 0.01);
+  watch.step(-0.3, high + 0.02, ms(1101));
+  EXPECT_NEAR(watch.error(), 0.02, 1e-12);
+  watch.step(-0.3, -0.31, ms(1102));
+  EXPECT_NEAR(watch.error(), 0.01, 1e-12);
+}
+
+TEST(SteeringWatch, FailsOnlyAfterItsTimeBeyondItsLargestError) {
+  const double largest = tracking().max_error;
+  const int time = static_cast<int>(std::lround(1e3 * tracking().max_time));
+  SteeringWatch watch(tracking());
+  watch.reset(0.0, ms(0));
+  watch.step(0.0, largest, ms(100));  // just still good
+  watch.step(0.0, 1.01 * largest, ms(101));
+  EXPECT_FALSE(watch.failed(ms(100 + time)));
+  EXPECT_TRUE(watch.failed(ms(101 + time)));
+}
+
+TEST(SteeringWatch, AResetBeginsAnew) {
+  SteeringWatch watch(tracking());
+  watch.reset(0.0, ms(0));
+  for (int i = 1; i < 1000; ++i) watch.step(0.0, 0.3, ms(i));
+  ASSERT_TRUE(watch.failed(ms(1000)));
+  watch.reset(0.3, ms(1000));
+  EXPECT_EQ(watch.error(), 0.0);
+  EXPECT_FALSE(watch.failed(ms(1001)));
+  watch.step(0.3, 0.3, ms(1001));
+  EXPECT_EQ(watch.error(), 0.0);
+  watch.step(0.3, 0.2, ms(1002));
+  EXPECT_NEAR(watch.error(), 0.1, 1e-12) << "both responses begin at the angle of the reset";
+}
+
 TEST(SteeringWatch, ForgivesAnErrorThatPasses) {
   SteeringWatch watch(tracking());
   watch.reset(0.0, ms(0));
@@ -297,6 +406,102 @@ TEST(SteeringWatch, ForgivesAnErrorThatPasses) {
     watch.step(0.0, (i % 500 < 450 ? 6.0 : 4.0) * kDeg, ms(i));
     ASSERT_FALSE(watch.failed(ms(i))) << i;
   }
+}
+
+// -------- transmission
+
+TEST(TransmitWatch, NeverHasMoreThanTwoSetsOnTheirWay) {
+  TransmitWatch watch;
+  watch.sent(3, ms(0));
+  EXPECT_FALSE(watch.full());
+  watch.sent(3, ms(20));
+  EXPECT_TRUE(watch.full());
+  watch.update(3, ms(21));
+  EXPECT_FALSE(watch.full());
+}
+
+TEST(TransmitWatch, TheAgeIsThatOfTheOldestFrameInFlight) {
+  TransmitWatch watch;
+  watch.sent(3, ms(0));
+  watch.update(1, ms(30));
+  EXPECT_FALSE(watch.stalled());
+  watch.sent(3, ms(30));
+  watch.update(4, ms(35));
+  EXPECT_TRUE(watch.stalled()) << "one frame of the first set";
+  watch.update(3, ms(36));
+  EXPECT_FALSE(watch.stalled());
+  watch.update(3, ms(65));
+  EXPECT_TRUE(watch.stalled());
+  watch.update(0, ms(66));
+  EXPECT_FALSE(watch.stalled());
+}
+
+TEST(TransmitWatch, AThirdSetIsNotTakenIn) {
+  TransmitWatch watch;
+  watch.sent(3, ms(0));
+  watch.sent(3, ms(10));
+  watch.sent(3, ms(20));
+  watch.update(3, ms(30));
+  EXPECT_FALSE(watch.full());
+  watch.update(0, ms(100));
+  EXPECT_FALSE(watch.stalled());
+  watch.sent(3, ms(100));
+  watch.update(3, ms(134));
+  EXPECT_FALSE(watch.stalled());
+}
+
+TEST(TransmitWatch, StallsWhenTheOldestFrameIs35MillisecondsOld) {
+  TransmitWatch watch;
+  watch.sent(1, ms(0));
+  watch.update(1, ms(34));
+  EXPECT_FALSE(watch.stalled());
+  watch.update(1, ms(35));
+  EXPECT_TRUE(watch.stalled());
+}
+
+TEST(TransmitWatch, SetsOfDifferentSizesAreSettledInTheirOrder) {
+  TransmitWatch watch;
+  watch.sent(1, ms(0));
+  watch.sent(3, ms(20));
+  watch.update(4, ms(34));
+  EXPECT_TRUE(watch.full());
+  watch.update(3, ms(54));
+  EXPECT_FALSE(watch.full());
+  EXPECT_FALSE(watch.stalled());
+  watch.update(1, ms(55));
+  EXPECT_TRUE(watch.stalled()) << "the last frame of the second set";
+  watch.sent(2, ms(56));
+  watch.update(2, ms(57));
+  EXPECT_FALSE(watch.stalled());
+  EXPECT_FALSE(watch.full());
+}
+
+TEST(TransmitWatch, FramesInFlightThatItDoesNotKnowOfSettleNothing) {
+  TransmitWatch watch;
+  watch.sent(3, ms(0));
+  watch.update(5, ms(10));
+  watch.update(3, ms(35));
+  EXPECT_TRUE(watch.stalled());
+}
+
+TEST(TransmitWatch, AfterAClockThatJumpedAgesBeginAnew) {
+  TransmitWatch watch;
+  watch.sent(3, ms(0));
+  watch.sent(3, ms(10));
+  watch.forgetTime(ms(5000));
+  watch.update(6, ms(5034));
+  EXPECT_FALSE(watch.stalled());
+  watch.update(6, ms(5035));
+  EXPECT_TRUE(watch.stalled());
+  watch.update(3, ms(5036));
+  EXPECT_TRUE(watch.stalled()) << "of the second set as well";
+}
+
+TEST(TransmitWatch, ASetOfWhichNothingWasTakenIsNotOnItsWay) {
+  TransmitWatch watch;
+  watch.sent(0, ms(0));
+  watch.update(0, ms(100));
+  EXPECT_FALSE(watch.stalled());
 }
 
 // -------- sender
@@ -339,7 +544,149 @@ TEST(CommandSender, BlocksTheSeventeenthFrameOfAQuarterSecond) {
   EXPECT_EQ(sender.setsBlocked(), 1u);
 }
 
+TEST(CommandSender, ASetThatCannotBeEncodedFailsAndNothingOfItIsSent) {
+  can::MemoryBusHub hub;
+  const auto bus = hub.connect(), wire = hub.connect();
+  CommandSender sender(0.02);
+  can::TruckCommandFrame impossible;
+  impossible.speed = std::nan("");
+  sender.send(impossible, {}, {}, *bus, ms(0));
+  EXPECT_EQ(sender.setsFailed(), 1u);
+  EXPECT_EQ(sender.framesSent(), 0u);
+  EXPECT_FALSE(wire->receive());
+}
+
+// A bus that takes so many frames and no more.
+class ShortBus : public can::Bus {
+ public:
+  explicit ShortBus(int room) : room_(room) {}
+  bool send(const can::Frame&) override { return room_-- > 0; }
+  std::optional<can::Frame> receive() override { return std::nullopt; }
+  std::uint64_t confirmed() const override { return 0; }
+  can::BusState state() const override { return can::BusState::kActive; }
+  int descriptor() const override { return -1; }
+
+ private:
+  int room_;
+};
+
+TEST(CommandSender, ASetThatWasNotTakenToItsLastFrameFails) {
+  for (const int room : {0, 1, 2}) {
+    ShortBus bus(room);
+    CommandSender sender(0.02);
+    sender.send({}, {}, {}, bus, ms(0));
+    EXPECT_EQ(sender.setsFailed(), 1u) << room;
+    EXPECT_EQ(sender.framesSent(), static_cast<std::uint32_t>(room));
+  }
+  ShortBus bus(3);
+  CommandSender sender(0.02);
+  sender.send({}, {}, {}, bus, ms(0));
+  EXPECT_EQ(sender.setsFailed(), 0u);
+}
+
 // -------- link
+
+TEST(TruckLink, AnyFrameOfOurOwnFromElsewhereIsAForeignSenders) {
+  for (const std::uint32_t id : {can::kTpCommandId, can::kTpCommandInfoId, can::kTpStatusId}) {
+    can::MemoryBusHub hub;
+    const auto bus = hub.connect(), peer = hub.connect();
+    TruckLink link(0.06);
+    can::Frame frame;
+    frame.id = id;
+    peer->send(frame);
+    link.receive(*bus, ms(0));
+    EXPECT_TRUE(link.foreignSender()) << id;
+    EXPECT_EQ(link.framesRejected(), 1u);
+    link.receive(*bus, ms(20));
+    EXPECT_FALSE(link.foreignSender()) << "only in the last call";
+  }
+}
+
+TEST(TruckLink, TakesTheOperatorsInputsAndTheCoils) {
+  can::MemoryBusHub hub;
+  const auto bus = hub.connect(), peer = hub.connect();
+  TruckLink link(0.06);
+  can::OperatorFrame inputs;
+  inputs.throttle = 0.25;
+  can::Coils1Frame coils1;
+  coils1.coils[0] = 0.5;
+  can::Coils2Frame coils2;
+  coils2.coils[2] = 0.75;
+  peer->send(*can::encode(inputs));
+  peer->send(*can::encode(coils1));
+  peer->send(*can::encode(coils2));
+  EXPECT_FALSE(link.receive(*bus, ms(0))) << "no feedback among them";
+  EXPECT_NEAR(link.operatorInputs().throttle, 0.25, 0.01);
+  EXPECT_NEAR(link.coils1().coils[0], 0.5, 0.01);
+  EXPECT_NEAR(link.coils2().coils[2], 0.75, 0.01);
+  EXPECT_EQ(link.framesRejected(), 0u);
+}
+
+TEST(TruckLink, EachOfTheThreeStreamsIsCorruptByItself) {
+  const can::Frame frames[] = {*can::encode(can::TruckFeedbackFrame()),
+                               *can::encode(can::TruckMotionFrame()),
+                               *can::encode(can::TruckStatusFrame())};
+  for (can::Frame frame : frames) {
+    can::MemoryBusHub hub;
+    const auto bus = hub.connect(), peer = hub.connect();
+    TruckLink link(0.06);
+    frame.data[0] ^= 1;
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_FALSE(link.corrupt()) << i;
+      peer->send(frame);
+      link.receive(*bus, ms(i));
+    }
+    EXPECT_TRUE(link.corrupt()) << frame.id;
+  }
+}
+
+TEST(TruckLink, CorruptFramesOfTheOperatorAndTheCoilsAreOnlyCounted) {
+  const can::Frame frames[] = {*can::encode(can::OperatorFrame()), *can::encode(can::Coils1Frame()),
+                               *can::encode(can::Coils2Frame())};
+  can::MemoryBusHub hub;
+  const auto bus = hub.connect(), peer = hub.connect();
+  TruckLink link(0.06);
+  for (can::Frame frame : frames) {
+    frame.data[0] ^= 1;
+    for (int i = 0; i < 3; ++i) peer->send(frame);
+  }
+  link.receive(*bus, ms(0));
+  EXPECT_FALSE(link.corrupt());
+  EXPECT_EQ(link.framesRejected(), 9u);
+}
+
+TEST(TruckLink, ARepeatedFrameIsRejected) {
+  const can::Frame frames[] = {
+      *can::encode(can::TruckFeedbackFrame()), *can::encode(can::TruckMotionFrame()),
+      *can::encode(can::TruckStatusFrame()),   *can::encode(can::OperatorFrame()),
+      *can::encode(can::Coils1Frame()),        *can::encode(can::Coils2Frame())};
+  can::MemoryBusHub hub;
+  const auto bus = hub.connect(), peer = hub.connect();
+  TruckLink link(0.06);
+  for (const can::Frame& frame : frames) {
+    peer->send(frame);
+    peer->send(frame);
+  }
+  link.receive(*bus, ms(0));
+  EXPECT_EQ(link.framesReceived(), 12u);
+  EXPECT_EQ(link.framesRejected(), 6u);
+}
+
+TEST(TruckLink, IsOldUntilAllThreeFramesCame) {
+  const can::Frame frames[] = {*can::encode(can::TruckFeedbackFrame()),
+                               *can::encode(can::TruckMotionFrame()),
+                               *can::encode(can::TruckStatusFrame())};
+  for (std::size_t missing = 0; missing < 3; ++missing) {
+    can::MemoryBusHub hub;
+    const auto bus = hub.connect(), peer = hub.connect();
+    TruckLink link(0.06);
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (i != missing) peer->send(frames[i]);
+    }
+    link.receive(*bus, ms(0));
+    EXPECT_TRUE(std::isinf(link.age(ms(0)))) << missing;
+  }
+}
 
 TEST(TruckLink, NeverTellsAnAgeTooYoung) {
   can::MemoryBusHub hub;

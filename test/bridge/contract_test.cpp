@@ -158,6 +158,13 @@ TEST(TransitionTable, EveryEventIsUsedAndHasAName) {
   }
 }
 
+TEST(TransitionTable, WhatIsNoEventHasNoNameAndNoRow) {
+  for (const int code : {kEventCount, 255}) {
+    EXPECT_EQ(toString(static_cast<Event>(code)), "unknown event");
+    EXPECT_EQ(findTransition(SafetyState::kActive, static_cast<Event>(code)), nullptr);
+  }
+}
+
 TEST(TransitionTable, StopsAreLeftOnlyByStandstillAndTheOperatorsReset) {
   for (int i = 0; i < kEventCount; ++i) {
     const auto event = static_cast<Event>(i);

@@ -200,38 +200,5 @@ TEST_P(SocketCanBridge, AProcessHeldUpLongerThanAnEchoMayTakeReadsItsEchoesFirst
   EXPECT_EQ(kernel.cycles, 0);
 }
 
-TEST(TransmitWatch, NeverHasMoreThanTwoSetsOnTheirWay) {
-  TransmitWatch watch;
-  watch.sent(3, ms(0));
-  EXPECT_FALSE(watch.full());
-  watch.sent(3, ms(20));
-  EXPECT_TRUE(watch.full());
-  watch.update(3, ms(21));
-  EXPECT_FALSE(watch.full());
-}
-
-TEST(TransmitWatch, TheAgeIsThatOfTheOldestFrameInFlight) {
-  TransmitWatch watch;
-  watch.sent(3, ms(0));
-  watch.update(1, ms(30));
-  EXPECT_FALSE(watch.stalled());
-  watch.sent(3, ms(30));
-  watch.update(4, ms(35));
-  EXPECT_TRUE(watch.stalled()) << "one frame of the first set";
-  watch.update(3, ms(36));
-  EXPECT_FALSE(watch.stalled());
-  watch.update(3, ms(65));
-  EXPECT_TRUE(watch.stalled());
-  watch.update(0, ms(66));
-  EXPECT_FALSE(watch.stalled());
-}
-
-TEST(TransmitWatch, ASetOfWhichNothingWasTakenIsNotOnItsWay) {
-  TransmitWatch watch;
-  watch.sent(0, ms(0));
-  watch.update(0, ms(100));
-  EXPECT_FALSE(watch.stalled());
-}
-
 }  // namespace
 }  // namespace tunnel_pilot::bridge

@@ -160,6 +160,17 @@ TEST(StreamCheck, ForgetsWrongFramesAfterTen) {
   EXPECT_FALSE(check.faulty());
 }
 
+TEST(StreamCheck, RemembersWrongCountersAsLongAsFramesThatCouldNotBeDecoded) {
+  StreamCheck check;
+  std::uint8_t counter = 0;
+  check.accept(counter);
+  for (int i = 0; i < 3; ++i) EXPECT_FALSE(check.accept(counter));
+  for (int i = 0; i < 7; ++i) check.accept(counter = nextCounter(counter));
+  EXPECT_TRUE(check.faulty());
+  check.accept(counter = nextCounter(counter));
+  EXPECT_FALSE(check.faulty());
+}
+
 TEST(StreamCheck, ReplayedFrameStreamIsFaultyWithinThreeFrames) {
   StreamCheck check;
   check.accept(4);

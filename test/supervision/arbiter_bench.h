@@ -29,7 +29,7 @@ struct ArbiterBench {
   }
 
   // Every input that is not withheld, 20 ms later; the truck goes on straight ahead.
-  const Decision& cycle() {
+  void inputs() {
     now += std::chrono::milliseconds(20);
     if (give_motion) {
       motion.stamp = now;
@@ -54,6 +54,10 @@ struct ArbiterBench {
       p.valid = proposal_valid;
       arbiter->setProposal(Source::kPreviewDriver, p, now);
     }
+  }
+
+  const Decision& cycle() {
+    inputs();
     return arbiter->decide(now);
   }
 

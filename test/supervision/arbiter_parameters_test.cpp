@@ -49,6 +49,12 @@ TEST(ArbiterParameters, AStopAgeBelowTheDegradedAgeIsRefused) {
   EXPECT_NE(refusal(yaml).find("scan_stop"), std::string::npos);
 }
 
+TEST(ArbiterParameters, ATableWithoutASourceIsRefused) {
+  YAML::Node yaml = YAML::LoadFile(kFile);
+  yaml["sources"] = YAML::Load("[]");
+  EXPECT_NE(refusal(yaml).find("sources"), std::string::npos);
+}
+
 TEST(ArbiterParameters, MissingLimitIsNamed) {
   YAML::Node yaml = YAML::LoadFile(kFile);
   yaml["limiter"].remove("max_jerk");

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <string>
 
 #include "tunnel_pilot/vehicle/articulation.h"
 
@@ -87,6 +88,19 @@ TEST(CommandLimiter, LateralAccelerationIsLimitedWithTheHigherOfBothSpeeds) {
   EXPECT_FALSE(slow.limit({widest + 0.004, 2.0, 2.0, false}, kCycle).fired.lateral_acceleration);
 }
 
+TEST(CommandLimiter, WhereNoSpeedIsMeasuredTheCommandedOneCounts) {
+  const double widest = vehicle::steadyArticulation(truck(), 2.0 / 64.0);
+  CommandLimiter fast = at(widest, 8.0);
+  EXPECT_DOUBLE_EQ(fast.limit({widest + 0.004, 8.0, kNaN, false}, kCycle).articulation, widest);
+  CommandLimiterParameters low = kLimits;
+  low.max_lateral_acceleration = 0.1;
+  CommandLimiter standing(low, truck());
+  standing.start(0.7, 0.0);
+  EXPECT_EQ(standing.limit({0.7, 0.0, kNaN, false}, kCycle).articulation, 0.7);
+  EXPECT_LT(standing.limit({0.7, 0.0, 0.9, false}, kCycle).articulation, 0.7)
+      << "slow, but not standing";
+}
+
 TEST(CommandLimiter, SpeedIsLoweredForTheBendThatIsAlreadySteered) {
   CommandLimiter limiter = at(0.5, 3.0);
   CommandLimiter::Result result;
@@ -139,9 +153,174 @@ TEST(CommandLimiter, ASpeedThatIsNoNumberSlowsDown) {
   EXPECT_NEAR(result.speed, 0.0, 1e-6);
 }
 
-TEST(CommandLimiter, APauseAllowsNoLargeStep) {
+TEST(CommandLimiter, APauseAllowsTheStepOfATenthOfASecond) {
   CommandLimiter limiter = at(0.0, 0.0);
-  EXPECT_LE(limiter.limit({0.7, 0.0, 0.0, false}, 10.0).articulation, 0.26 * 0.1 + 1e-12);
+  EXPECT_DOUBLE_EQ(limiter.limit({0.7, 0.0, 0.0, false}, 10.0).articulation, 0.26 * 0.1);
+}
+
+TEST(CommandLimiter, ATimeThatDidNotPassMovesNothing) {
+  for (const double elapsed : {0.0, -1.0, kNaN, std::numeric_limits<double>::infinity()}) {
+    CommandLimiter limiter = at(0.2, 1.0);
+    const CommandLimiter::Result result = limiter.limit({0.7, 5.0, 1.0, false}, elapsed);
+    EXPECT_EQ(result.articulation, 0.2);
+    EXPECT_EQ(result.speed, 1.0);
+  }
+}
+
+TEST(CommandLimiter, ATimeThatDidNotPassLeavesTheAccelerationAsItIs) {
+  CommandLimiter limiter = at(0.0, 2.0);
+  limiter.limit({0.0, 8.0, 2.0, false}, kCycle);
+  const double before = limiter.limit({0.0, 8.0, 2.0, false}, kCycle).speed;
+  limiter.limit({0.0, 8.0, 2.0, false}, 0.0);
+  const double acceleration = 3 * 3.0 * kCycle;  // of the third cycle at the highest jerk
+  EXPECT_NEAR(limiter.limit({0.0, 8.0, 2.0, false}, kCycle).speed - before, acceleration * kCycle,
+              1e-12);
+}
+
+TEST(CommandLimiter, StartsWithinTheLimits) {
+  EXPECT_EQ(at(2.0, 1.0).articulation(), 0.75);
+  EXPECT_EQ(at(-2.0, 1.0).articulation(), -0.75);
+  EXPECT_EQ(at(0.0, 20.0).limit({0.0, 20.0, 0.0, false}, 0.0).speed, 9.7);
+  EXPECT_EQ(at(0.0, -1.0).limit({0.0, 0.0, 0.0, false}, 0.0).speed, 0.0);
+}
+
+TEST(CommandLimiter, StartsWithWhatItHadWhereTheTruckTellsNoNumber) {
+  CommandLimiter limiter = at(0.2, 1.0);
+  limiter.start(kNaN, kNaN);
+  const CommandLimiter::Result result = limiter.limit({0.2, 1.0, 1.0, false}, kCycle);
+  EXPECT_EQ(result.articulation, 0.2);
+  EXPECT_EQ(result.speed, 1.0);
+}
+
+TEST(CommandLimiter, StartsWithoutAcceleration) {
+  CommandLimiter limiter = at(0.0, 2.0);
+  for (int i = 0; i < 50; ++i) limiter.limit({0.0, 8.0, 2.0, false}, kCycle);
+  limiter.start(0.0, 2.0);
+  EXPECT_NEAR(limiter.limit({0.0, 8.0, 2.0, false}, kCycle).speed, 2.0 + 3.0 * kCycle * kCycle, 1e-12);
+}
+
+TEST(CommandLimiter, AStopForgetsTheAcceleration) {
+  CommandLimiter limiter = at(0.0, 2.0);
+  for (int i = 0; i < 50; ++i) limiter.limit({0.0, 8.0, 2.0, false}, kCycle);
+  limiter.limit({0.0, 8.0, 2.0, true}, kCycle);
+  EXPECT_NEAR(limiter.limit({0.0, 8.0, 2.0, false}, kCycle).speed, 3.0 * kCycle * kCycle, 1e-12);
+}
+
+TEST(CommandLimiter, TellsTheAccelerationThatTheSpeedNeeds) {
+  EXPECT_EQ(at(0.0, 2.0).limit({0.0, 2.0, 2.0, false}, kCycle).acceleration, kLimits.max_acceleration);
+  EXPECT_EQ(at(0.0, 2.0).limit({0.0, 3.0, 2.0, false}, kCycle).acceleration, kLimits.max_acceleration);
+  EXPECT_EQ(at(0.0, 2.0).limit({0.0, 1.0, 2.0, false}, kCycle).acceleration, kLimits.max_deceleration);
+}
+
+TEST(CommandLimiter, ASpeedOutsideItsRangeIsFlagged) {
+  EXPECT_TRUE(at(0.0, 9.7).limit({0.0, 9.8, 9.7, false}, kCycle).fired.speed);
+  EXPECT_TRUE(at(0.0, 0.0).limit({0.0, -0.1, 0.0, false}, kCycle).fired.speed);
+  EXPECT_FALSE(at(0.0, 9.7).limit({0.0, 9.7, 9.7, false}, kCycle).fired.speed);
+  EXPECT_FALSE(at(0.0, 0.0).limit({0.0, 0.0, 0.0, false}, kCycle).fired.speed);
+}
+
+TEST(CommandLimiter, ASpeedThatIsNoNumberIsFlagged) {
+  const CommandLimiter::Flags fired = at(0.0, 2.0).limit({0.0, kNaN, 2.0, false}, kCycle).fired;
+  EXPECT_TRUE(fired.not_finite);
+  EXPECT_FALSE(fired.speed);
+}
+
+TEST(CommandLimiter, TheBendsSpeedIsThatOfItsLateralAcceleration) {
+  CommandLimiter limiter = at(0.5, 3.0);
+  CommandLimiter::Result result;
+  for (int i = 0; i < 500; ++i) result = limiter.limit({0.5, 9.0, 0.0, false}, kCycle);
+  EXPECT_NEAR(lateralAcceleration(result.speed, 0.5), 2.0, 1e-6);
+  EXPECT_TRUE(result.fired.lateral_acceleration);
+}
+
+TEST(CommandLimiter, BrakesUpToItsDecelerationWithinTheJerk) {
+  CommandLimiter limiter = at(0.0, 8.0);
+  double speed = 8.0, acceleration = 0.0, hardest = 0.0;
+  for (int i = 0; i < 600; ++i) {
+    const CommandLimiter::Result result = limiter.limit({0.0, 2.0, speed, false}, kCycle);
+    const double now = (result.speed - speed) / kCycle;
+    EXPECT_LE(std::abs(now - acceleration), 3.0 * kCycle + 1e-9);
+    hardest = std::min(hardest, now);
+    acceleration = now;
+    speed = result.speed;
+    EXPECT_GE(speed, 2.0 - 1e-9);
+  }
+  EXPECT_NEAR(hardest, -1.2, 1e-9);
+  EXPECT_NEAR(speed, 2.0, 1e-6);
+}
+
+TEST(CommandLimiter, TheAccelerationsLimitIsFlaggedOnlyWhereItIsReached) {
+  EXPECT_TRUE(at(0.0, 2.0).limit({0.0, 2.0 + 0.81 * kCycle, 2.0, false}, kCycle).fired.acceleration);
+  EXPECT_FALSE(at(0.0, 2.0).limit({0.0, 2.0 + 0.79 * kCycle, 2.0, false}, kCycle).fired.acceleration);
+  EXPECT_TRUE(at(0.0, 2.0).limit({0.0, 2.0 - 1.21 * kCycle, 2.0, false}, kCycle).fired.acceleration);
+  EXPECT_FALSE(at(0.0, 2.0).limit({0.0, 2.0 - 1.19 * kCycle, 2.0, false}, kCycle).fired.acceleration);
+}
+
+TEST(CommandLimiter, TheJerksLimitIsFlaggedOnlyWhereItIsReached) {
+  const double step = 3.0 * kCycle * kCycle;
+  EXPECT_TRUE(at(0.0, 2.0).limit({0.0, 2.0 + 1.01 * step, 2.0, false}, kCycle).fired.jerk);
+  EXPECT_FALSE(at(0.0, 2.0).limit({0.0, 2.0 + 0.99 * step, 2.0, false}, kCycle).fired.jerk);
+  EXPECT_TRUE(at(0.0, 2.0).limit({0.0, 2.0 - 1.01 * step, 2.0, false}, kCycle).fired.jerk);
+  EXPECT_FALSE(at(0.0, 2.0).limit({0.0, 2.0 - 0.99 * step, 2.0, false}, kCycle).fired.jerk);
+}
+
+TEST(CommandLimiter, LandsOnItsSpeedAsTheJerkAllows) {
+  for (const double sign : {1.0, -1.0}) {
+    CommandLimiter limiter = at(0.0, 2.0);
+    const double speed = limiter.limit({0.0, 2.0 + sign, 2.0, false}, kCycle).speed;
+    const double landing = std::sqrt(2.0 * 3.0 * 0.004) - 3.0 * kCycle;
+    const CommandLimiter::Result result = limiter.limit({0.0, speed + sign * 0.004, 2.0, false}, kCycle);
+    EXPECT_NEAR(result.speed - speed, sign * landing * kCycle, 1e-12);
+    EXPECT_TRUE(result.fired.jerk);
+  }
+}
+
+// -------- parameters
+
+struct Range {
+  const char* key;
+  double low, high;
+  double CommandLimiterParameters::*field;
+};
+constexpr Range kRanges[] = {
+    {"max_articulation", 0.05, 1.2, &CommandLimiterParameters::max_articulation},
+    {"max_articulation_rate", 0.01, 2.0, &CommandLimiterParameters::max_articulation_rate},
+    {"max_lateral_acceleration", 0.1, 5.0, &CommandLimiterParameters::max_lateral_acceleration},
+    {"max_speed", 0.1, 15.0, &CommandLimiterParameters::max_speed},
+    {"max_acceleration", 0.05, 5.0, &CommandLimiterParameters::max_acceleration},
+    {"max_deceleration", 0.05, 5.0, &CommandLimiterParameters::max_deceleration},
+    {"max_jerk", 0.1, 50.0, &CommandLimiterParameters::max_jerk},
+    {"stop_deceleration", 0.05, 10.0, &CommandLimiterParameters::stop_deceleration},
+};
+
+YAML::Node middleOfAllRanges() {
+  YAML::Node yaml;
+  for (const Range& range : kRanges) yaml[range.key] = 0.5 * (range.low + range.high);
+  return yaml;
+}
+
+CommandLimiterParameters loaded(const std::string& key, double value) {
+  YAML::Node yaml = middleOfAllRanges();
+  yaml[key] = value;
+  return loadCommandLimiter(config::Node(yaml, "limiter"));
+}
+
+TEST(CommandLimiterParameters, AreTakenUpToTheEndsOfTheirRanges) {
+  for (const Range& range : kRanges) {
+    EXPECT_EQ(loaded(range.key, range.low).*range.field, range.low) << range.key;
+    EXPECT_EQ(loaded(range.key, range.high).*range.field, range.high) << range.key;
+  }
+}
+
+TEST(CommandLimiterParameters, AreRefusedBeyondTheirRanges) {
+  for (const Range& range : kRanges) {
+    EXPECT_THROW(loaded(range.key, 0.99 * range.low), config::ConfigError) << range.key;
+    EXPECT_THROW(loaded(range.key, 1.01 * range.high), config::ConfigError) << range.key;
+  }
+}
+
+TEST(CommandLimiterParameters, AnUnknownKeyIsRefused) {
+  EXPECT_THROW(loaded("typo", 1.0), config::ConfigError);
 }
 
 // Whatever is asked, measured and however long it took.

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <set>
+#include <string>
 
 #include "tunnel_pilot/vehicle/truck_parameters.h"
 
@@ -34,6 +36,21 @@ TEST(SpeedGovernor, AStraightIsLimitedByTheHighestSpeedOnly) {
   const SpeedGovernor::Limit limit = limitOn({{40.0, 0.0, 0.0}}, 2.0);
   EXPECT_EQ(limit.speed, 9.0);
   EXPECT_EQ(limit.by, SpeedLimit::kNone);
+}
+
+TEST(SpeedGovernor, WithoutAProfileTheHighestSpeedLimits) {
+  const SpeedGovernor::Limit limit = SpeedGovernor(parameters()).alongPath({}, 0.0);
+  EXPECT_EQ(limit.speed, 9.0);
+  EXPECT_EQ(limit.by, SpeedLimit::kNone);
+}
+
+TEST(SpeedGovernor, EveryLimitHasItsOwnName) {
+  std::set<std::string> names;
+  for (int code = 0; code <= static_cast<int>(SpeedLimit::kLimiter); ++code) {
+    EXPECT_TRUE(names.insert(toString(static_cast<SpeedLimit>(code))).second) << code;
+  }
+  EXPECT_EQ(names.count("unknown"), 0u);
+  EXPECT_EQ(toString(static_cast<SpeedLimit>(255)), "unknown");
 }
 
 TEST(SpeedGovernor, AnArcIsLimitedByLateralAcceleration) {

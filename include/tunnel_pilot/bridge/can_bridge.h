@@ -3,6 +3,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "tunnel_pilot/bridge/bridge_parameters.h"
@@ -70,7 +71,7 @@ class CanBridge {
   void setCommand(const supervision::Command& command, Stamp now);
 
   /// Refuses a command for a reason of the caller's, as setCommand() refuses one.
-  void rejectCommand(const supervision::Command& command, const std::string& why, Stamp now);
+  void rejectCommand(const supervision::Command& command, std::string_view why, Stamp now);
 
   /// Which of the pilot's processes gives no sign of life (HeartbeatWatch); none: all do. Asked of
   /// before each tick.
@@ -112,7 +113,7 @@ class CanBridge {
   std::optional<Event> anyFault(Stamp now) const;
   std::optional<Event> degradation(Stamp now) const;
 
-  std::string whyRefused(const supervision::Command& command, Stamp now) const;
+  std::string_view whyRefused(const supervision::Command& command, Stamp now) const;
   std::uint32_t monotonous(std::uint32_t sequence);
   void listen(Stamp now);
   void clearBus(Stamp now);

@@ -1,6 +1,7 @@
 #pragma once
 
-#include <deque>
+#include <cstddef>
+#include <vector>
 
 #include "tunnel_pilot/bridge/bridge_parameters.h"
 #include "tunnel_pilot/geometry/time.h"
@@ -26,13 +27,16 @@ class SteeringResponse {
     double angle;
   };
 
+  /// More than are sent in any dead time (CommandSender): a step allocates nothing.
+  static constexpr std::size_t kReserved = 64;
+
   Stamp dead_time_;
   double rate_;
   double lag_;
-  std::deque<Sent> sent_;  ///< not yet effective, oldest first
-  double demand_ = 0.0;    ///< effective now [rad]
-  double ramp_ = 0.0;      ///< behind the rate limit [rad]
-  double angle_ = 0.0;     ///< [rad]
+  std::vector<Sent> sent_;  ///< not yet effective, oldest first
+  double demand_ = 0.0;     ///< effective now [rad]
+  double ramp_ = 0.0;       ///< behind the rate limit [rad]
+  double angle_ = 0.0;      ///< [rad]
   Stamp last_{};
 };
 

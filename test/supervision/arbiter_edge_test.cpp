@@ -1,0 +1,336 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "arbiter_bench.h"
+
+// What an ordinary drive never shows: inputs that come in an odd order or not at all, tables without
+// walls or with sources that do not steer.
+namespace tunnel_pilot::supervision {
+namespace {
+
+using std::chrono::milliseconds;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+SourceRule& ruleOf(ArbiterBench& bench, Source source) {
+  for (SourceRule& rule : bench.parameters.sources) {
+    if (rule.source == source) return rule;
+  }
+  throw std::logic_error("no such rule");
+}
+
+void startAnew(ArbiterBench& bench) {
+  bench.arbiter = std::make_unique<Arbiter>(bench.parameters, bench.truck);
+}
+
+// ---- proposals
+
+TEST(ArbiterEdge, AProposalWithoutAPossibleSpeedIsInvalid) {
+  for (const double speed : {kNaN, -0.1}) {
+    ArbiterBench bench;
+    bench.drive();
+    bench.speed = speed;
+    EXPECT_EQ(bench.cycle().command.reason, Reason::kProposalInvalid) << speed;
+  }
+}
+
+TEST(ArbiterEdge, ASourceThatDoesNotSteerOnlyLimitsTheSpeed) {
+  ArbiterBench bench;
+  ruleOf(bench, Source::kTeleoperation).steers = false;
+  startAnew(bench);
+  bench.drive();
+  bench.arbiter->setProposal(Source::kTeleoperation, bench.proposal(0.3, 2.5), bench.now);
+  const Decision& decision = bench.cycle();
+  EXPECT_EQ(decision.command.source, Source::kPreviewDriver);
+  EXPECT_EQ(decision.speed_source, Source::kTeleoperation);
+}
+
+TEST(ArbiterEdge, ASourceThatDoesNotSteerIsNoSourceOfSteering) {
+  ArbiterBench bench;
+  ruleOf(bench, Source::kTeleoperation).steers = false;
+  startAnew(bench);
+  bench.drive();
+  bench.give_proposal = false;
+  Decision decision;
+  for (int i = 0; i < 20; ++i) {
+    bench.arbiter->setProposal(Source::kTeleoperation, bench.proposal(), bench.now);
+    decision = bench.cycle();
+  }
+  EXPECT_EQ(decision.command.reason, Reason::kSourceStale);
+  EXPECT_EQ(decision.command.source, Source::kDeadReckoning);
+}
+
+TEST(ArbiterEdge, ASourceThatGivesNoSpeedLimitsNone) {
+  ArbiterBench bench;
+  ruleOf(bench, Source::kLidarDriver).gives_speed = false;
+  startAnew(bench);
+  bench.drive();
+  bench.arbiter->setProposal(Source::kLidarDriver, bench.proposal(0.0, 1.0), bench.now);
+  const Decision& decision = bench.cycle();
+  EXPECT_EQ(decision.command.source, Source::kLidarDriver);
+  EXPECT_EQ(decision.speed_source, Source::kPreviewDriver);
+}
+
+TEST(ArbiterEdge, ADriverWhoseRowDoesNotSteerCannotBeSelected) {
+  ArbiterBench bench;
+  ruleOf(bench, Source::kLidarDriver).steers = false;
+  startAnew(bench);
+  EXPECT_FALSE(bench.arbiter->selectDriver(Source::kLidarDriver));
+}
+
+// A late scan excuses all that wait for it, a lost tunnel all that need it.
+TEST(ArbiterEdge, TwoDriversThatWaitForALateScanAreExcusedBoth) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.arbiter->setProposal(Source::kLidarDriver, bench.proposal(), bench.now);
+  bench.cycle();
+  bench.give_scan = bench.give_proposal = false;
+  EXPECT_FALSE(bench.cycles(8).command.stop);
+  EXPECT_EQ(bench.cycles(10).command.reason, Reason::kScanStale);
+}
+
+TEST(ArbiterEdge, TwoDriversThatLackTheTunnelAreExcusedBoth) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.tunnel_valid = bench.proposal_valid = false;
+  drivers::Proposal unable = bench.proposal();
+  unable.valid = false;
+  for (int i = 0; i < 4; ++i) {
+    unable.stamp = bench.now;
+    bench.arbiter->setProposal(Source::kLidarDriver, unable, bench.now);
+    EXPECT_FALSE(bench.cycle().command.stop) << i;
+  }
+}
+
+// ---- an order of inputs that is not the usual one
+
+TEST(ArbiterEdge, MotionThatNeverWasANumberIsNotWaitedFor) {
+  ArbiterBench bench;
+  bench.motion.yaw_rate = kNaN;
+  EXPECT_EQ(bench.cycle().command.reason, Reason::kMotionStale);
+}
+
+TEST(ArbiterEdge, MotionThatWasMeasuredLongAgoIsStale) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.give_motion = false;
+  const Stamp measured = bench.motion.stamp;
+  Reason reason = Reason::kNone;
+  for (int i = 0; i < 10 && reason == Reason::kNone; ++i) {
+    bench.motion.stamp = measured + milliseconds(i);
+    bench.arbiter->setMotion(bench.motion, bench.now);  // comes all the time, and is old
+    reason = bench.cycle().command.reason;
+  }
+  EXPECT_EQ(reason, Reason::kMotionStale);
+}
+
+TEST(ArbiterEdge, WithoutMotionAnEngagedTruckIsHeldAndThenSteeredFromWhereItStands) {
+  ArbiterBench bench;
+  bench.cycles(1);
+  startAnew(bench);
+  bench.give_motion = false;
+  bench.cycles(2);
+  bench.state = {true, false, Reason::kNone};
+  EXPECT_EQ(bench.cycle().command.articulation_angle, 0.0);
+  bench.give_motion = true;
+  bench.motion.articulation = bench.wanted = 0.2;
+  bench.motion.speed = 0.0;
+  EXPECT_NEAR(bench.cycle().command.articulation_angle, 0.2, 1e-12);
+}
+
+TEST(ArbiterEdge, AScanWithoutItsWallsIsWaitedFor) {
+  ArbiterBench bench;
+  bench.cycle();
+  startAnew(bench);
+  bench.give_scan = false;
+  bench.arbiter->setPoints(bench.scene.points, bench.now, bench.now);
+  bench.scene.tunnel.state.stamp = bench.now;
+  bench.arbiter->setTunnel(bench.scene.tunnel, bench.now);
+  const Decision& decision = bench.cycle();
+  EXPECT_EQ(decision.command.reason, Reason::kStartUp);
+  EXPECT_TRUE(std::isnan(decision.clearance_left));
+}
+
+TEST(ArbiterEdge, AScanWithoutItsTunnelIsNotCompared) {
+  ArbiterBench bench;
+  bench.cycle();
+  startAnew(bench);
+  bench.give_scan = false;
+  for (int i = 0; i < 2; ++i) {  // first without any tunnel, then with that of an older scan
+    const Stamp scan = bench.now;
+    bench.scene.walls.stamp = scan;
+    bench.arbiter->setPoints(bench.scene.points, scan, bench.now);
+    bench.arbiter->setWalls(bench.scene.walls, bench.now);
+    EXPECT_TRUE(std::isnan(bench.cycle().clearance_left)) << i;
+    bench.scene.tunnel.state.stamp = scan;
+    bench.arbiter->setTunnel(bench.scene.tunnel, bench.now);
+  }
+}
+
+TEST(ArbiterEdge, WithoutAnyTunnelTheWallsAreComparedAllTheSame) {
+  ArbiterBench bench;
+  bench.tunnel_valid = false;
+  const Decision& decision = bench.cycles(5);
+  EXPECT_EQ(decision.command.reason, Reason::kTunnelInvalid);
+  EXPECT_NEAR(decision.clearance_left, 0.975, 0.02);
+}
+
+TEST(ArbiterEdge, AValidTunnelWithoutACenterlineIsNone) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.give_scan = false;
+  Decision decision;
+  for (int i = 0; i < 40; ++i) {
+    bench.scene = sceneAt(bench.line, {20.0, 0.0, 0.0}, 5.0, bench.now, 25.0);
+    bench.scene.tunnel.centerline = geometry::Path();
+    bench.arbiter->setPoints(bench.scene.points, bench.now, bench.now);
+    bench.arbiter->setWalls(bench.scene.walls, bench.now);
+    bench.arbiter->setTunnel(bench.scene.tunnel, bench.now);
+    decision = bench.cycle();
+  }
+  EXPECT_EQ(decision.command.reason, Reason::kTunnelInvalid);
+}
+
+TEST(ArbiterEdge, ACenterlineSeenBeforeTheFirstMotionSteersNoStop) {
+  ArbiterBench bench;
+  bench.give_motion = false;
+  bench.cycle();
+  bench.give_motion = true;
+  bench.give_scan = bench.give_proposal = false;
+  EXPECT_EQ(bench.cycles(8).command.source, Source::kHold);
+}
+
+TEST(ArbiterEdge, ACenterlineTooOldForDeadReckoningHolds) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.tunnel_valid = bench.proposal_valid = false;
+  const int cycles = static_cast<int>(bench.parameters.dead_reckoning_age / 0.02);
+  EXPECT_EQ(bench.cycles(cycles - 5).command.source, Source::kDeadReckoning);
+  EXPECT_EQ(bench.cycles(10).command.source, Source::kHold);
+}
+
+// ---- what stops, and for how long
+
+TEST(ArbiterEdge, WhereTheTruckHasNoStatesStartingUpIsNoLatchedStop) {
+  ArbiterBench bench(false);
+  EXPECT_EQ(bench.arbiter->decide(bench.now).command.reason, Reason::kStartUp);
+  EXPECT_EQ(bench.cycles(10).command.reason, Reason::kNone);
+}
+
+TEST(ArbiterEdge, BeforeAnyMotionAResetIsRefused) {
+  ArbiterBench bench(false);
+  EXPECT_FALSE(bench.arbiter->reset(bench.now));
+}
+
+TEST(ArbiterEdge, AtRestAResetIsRefusedWhileSomethingStops) {
+  ArbiterBench bench(false);
+  bench.drive();
+  bench.motion.speed = 0.0;
+  bench.give_proposal = false;
+  EXPECT_TRUE(bench.cycles(20).command.stop);
+  EXPECT_FALSE(bench.arbiter->reset(bench.now));
+}
+
+TEST(ArbiterEdge, AClockThatJumpsWhileNobodyIsEngagedLatchesNothing) {
+  ArbiterBench bench;
+  bench.cycles(10);
+  bench.arbiter->clockJumped();
+  EXPECT_EQ(bench.cycles(10).command.reason, Reason::kNotEngaged);
+}
+
+TEST(ArbiterEdge, AClockThatJumpsInAStopLeavesItsReason) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.arbiter->requestStop(bench.now);
+  bench.cycle();
+  bench.arbiter->clockJumped();
+  EXPECT_EQ(bench.cycles(10).command.reason, Reason::kOperatorStop);
+}
+
+// ---- speed
+
+TEST(ArbiterEdge, WithoutWallChecksTheEndOfTheCenterlineLimitsTheSpeed) {
+  ArbiterBench bench;
+  bench.parameters.wall_checks = false;
+  startAnew(bench);
+  bench.speed = 9.0;
+  bench.drive();
+  const Decision& decision = bench.cycle();
+  EXPECT_FALSE(decision.command.stop);
+  EXPECT_EQ(decision.limited_by, SpeedLimit::kSight);
+  EXPECT_TRUE(std::isnan(decision.clearance_left));
+  EXPECT_TRUE(std::isnan(decision.free_distance));
+}
+
+TEST(ArbiterEdge, ADegradedDriveIsNoFasterThanItsDriverWants) {
+  ArbiterBench bench;
+  bench.speed = 1.0;
+  bench.motion.speed = 1.0;
+  bench.drive();
+  drivers::Proposal unsure = bench.proposal();
+  unsure.confidence = 0.0;
+  bench.arbiter->setProposal(Source::kLidarDriver, unsure, bench.now);
+  const Decision& decision = bench.cycle();
+  EXPECT_TRUE(decision.degraded);
+  EXPECT_EQ(decision.limited_by, SpeedLimit::kDriver);
+}
+
+TEST(ArbiterEdge, AnObstacleFarAheadDoesNotKeepAStandingTruck) {
+  ArbiterBench bench;
+  bench.motion.speed = 0.0;
+  bench.obstacle = 6.0;
+  bench.speed = 9.0;
+  bench.drive();
+  const Decision& decision = bench.cycles(20);
+  EXPECT_EQ(decision.limited_by, SpeedLimit::kObstacle);
+  EXPECT_GT(decision.command.speed, 0.0);
+  EXPECT_EQ(decision.command.reason, Reason::kNone);
+}
+
+TEST(ArbiterEdge, StandingAtTheEndOfSightSaysSo) {
+  ArbiterBench bench;
+  bench.motion.speed = 0.0;
+  bench.drive();
+  bench.give_scan = false;
+  Decision decision;
+  for (int i = 0; i < 5; ++i) {
+    bench.scene = sceneAt(bench.line, {20.0, 0.0, 0.0}, 5.0, bench.now, 3.0);
+    bench.arbiter->setPoints(bench.scene.points, bench.now, bench.now);
+    bench.arbiter->setWalls(bench.scene.walls, bench.now);
+    bench.arbiter->setTunnel(bench.scene.tunnel, bench.now);
+    decision = bench.cycle();
+  }
+  EXPECT_FALSE(decision.command.stop);
+  EXPECT_EQ(decision.command.reason, Reason::kTunnelInvalid);
+}
+
+TEST(ArbiterEdge, StandingBecauseTheDriverWantsToNeedsNoReason) {
+  ArbiterBench bench;
+  bench.motion.speed = 0.0;
+  bench.speed = 0.0;
+  bench.drive();
+  EXPECT_EQ(bench.cycle().command.reason, Reason::kNone);
+}
+
+// ---- limits
+
+TEST(ArbiterEdge, LateralAccelerationLimitedAgainAndAgainDegrades) {
+  ArbiterBench bench;
+  bench.motion.speed = 6.0;
+  bench.drive();
+  bench.wanted = 0.6;  // a possible angle, but not at this speed
+  EXPECT_EQ(bench.cycles(6).command.reason, Reason::kLimitsHit);
+}
+
+TEST(ArbiterEdge, LimitsHitWhileNobodyIsEngagedDoNotCount) {
+  ArbiterBench bench;
+  bench.wanted = 0.9;
+  bench.cycles(20);
+  bench.wanted = 0.0;
+  bench.state = {true, false, Reason::kNone};
+  EXPECT_FALSE(bench.cycle().degraded);
+}
+
+}  // namespace
+}  // namespace tunnel_pilot::supervision
