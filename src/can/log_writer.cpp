@@ -18,14 +18,17 @@ std::string toText(Stamp stamp) {
 }  // namespace
 
 std::string toText(const Frame& frame) {
-  char text[32];
-  const int start = std::snprintf(text, sizeof text, frame.extended ? "%08X#" : "%03X#", frame.id);
-  std::string result(text, static_cast<std::size_t>(start));
-  for (std::size_t i = 0; i < std::min<std::size_t>(frame.length, frame.data.size()); ++i) {
-    std::snprintf(text, sizeof text, "%02X", frame.data[i]);
-    result += text;
+  static constexpr char kDigits[] = "0123456789ABCDEF";
+  std::string text;
+  for (int shift = frame.extended ? 28 : 8; shift >= 0; shift -= 4) {
+    text += kDigits[frame.id >> shift & 0xFU];
   }
-  return result;
+  text += '#';
+  for (std::size_t i = 0; i < std::min<std::size_t>(frame.length, frame.data.size()); ++i) {
+    text += kDigits[frame.data[i] >> 4U];
+    text += kDigits[frame.data[i] & 0xFU];
+  }
+  return text;
 }
 
 void LogWriter::frame(const Frame& frame, Stamp now) {
