@@ -500,6 +500,8 @@ TEST(TransmitWatch, AfterAClockThatJumpedAgesBeginAnew) {
 TEST(TransmitWatch, ASetOfWhichNothingWasTakenIsNotOnItsWay) {
   TransmitWatch watch;
   watch.sent(0, ms(0));
+  watch.sent(0, ms(1));
+  EXPECT_FALSE(watch.full());
   watch.update(0, ms(100));
   EXPECT_FALSE(watch.stalled());
 }

@@ -313,6 +313,12 @@ TEST(ArbiterEdge, StandingBecauseTheDriverWantsToNeedsNoReason) {
   EXPECT_EQ(bench.cycle().command.reason, Reason::kNone);
 }
 
+TEST(ArbiterEdge, EveryReasonIsOfSomeGravity) {
+  for (int code = 1; code <= static_cast<int>(Reason::kProcessSilent); ++code) {
+    EXPECT_GT(gravity(static_cast<Reason>(code)), 0) << code;
+  }
+}
+
 // ---- limits
 
 TEST(ArbiterEdge, LateralAccelerationLimitedAgainAndAgainDegrades) {
