@@ -219,8 +219,9 @@ class Rig {
     if (faults.commands_out_of_range) sent.articulation_angle = 1.5;
     if (faults.degraded) sent.reason = supervision::Reason::kLowConfidence;
     sent.stop = faults.stop_asked;
+    if (!faults.measurement_frozen)
+      event("measurement preview_driver 60");  // though its command is lost
     if (faults.commands_lost) return;
-    if (!faults.measurement_frozen) event("measurement preview_driver 60");
     if (sent.stop) event("command_stop");
     bridge_.setCommand(sent, clock());
     const bool bad =
