@@ -164,8 +164,9 @@ class CanMachineCampaign : public testing::Test {
   std::minstd_rand engine{seed()};
 };
 
-// Not run: after some 30 faults one side hears nothing any more, which a cycle of the links does not cure. The fault may be
-// the emulated controller's (its queue of received frames after an overrun, by the flood); that is not shown yet.
+// Not run: after some 30 faults one side hears nothing any more, which a cycle of the links does not
+// cure. The fault may be the emulated controller's (its queue of received frames after an overrun, by
+// the flood); that is not shown yet.
 TEST_F(CanMachineCampaign, DISABLED_RandomFaults) {
   const int many = times(200, 10000);
   int driving = 0;
