@@ -14,8 +14,8 @@ namespace {
 
 constexpr Stamp kLongestGap = std::chrono::milliseconds(150);  // between motions
 constexpr Stamp kHalfWindow = std::chrono::milliseconds(500);  // of the fits through the offsets
-constexpr double kLeastShare = 0.6;    // of a window's scans in which the tunnel was measured
-constexpr double kSettlingWays = 3.0;  // lengths l_r after which a wrong start of g is forgotten
+constexpr double kLeastMeasured = 0.6;  // of a window's scans in which the tunnel was measured
+constexpr double kSettlingWays = 3.0;   // lengths l_r after which a wrong start of g is forgotten
 constexpr Stamp kMemory = std::chrono::seconds(3);
 
 double mixed(double a, double b, double share) { return a + share * (b - a); }
@@ -133,7 +133,7 @@ std::optional<Demonstration::Deviation> Demonstration::fitted(std::size_t middle
     normal += powers * powers.transpose();
     right += powers * place.offset;
   }
-  if (measured < 8 || measured < kLeastShare * scans) return std::nullopt;
+  if (measured < 8 || measured < kLeastMeasured * scans) return std::nullopt;
   const Eigen::Vector3d parabola = normal.ldlt().solve(right);
   const std::optional<Moment> moment = momentAt(stamp);
   if (!moment || !(moment->motion.speed >= parameters_.least_speed)) return std::nullopt;

@@ -174,9 +174,9 @@ HumanDrive driveAsHuman(const simulation::Scenario& scenario, const simulation::
 
 namespace {
 
-constexpr double kBin = 0.1;          // [m]
-constexpr float kInBend = 0.05F;      // articulation that tells a bend [rad]
-constexpr double kLeastShare = 0.15;  // of lessons far inside that stay: they teach to come back
+constexpr double kBin = 0.1;         // [m]
+constexpr float kInBend = 0.05F;     // articulation that tells a bend [rad]
+constexpr double kLeastKept = 0.15;  // of lessons far inside that stay: they teach to come back
 
 // Offset to the inside of the bend, in bins; on straights all are in the middle one.
 int binOf(const Lesson& lesson) {
@@ -200,7 +200,7 @@ DataSet examplesOf(const std::vector<Lesson>& lessons, bool corrected) {
   for (const Lesson& lesson : lessons) {
     if (!lesson.correction) continue;
     const int bin = binOf(lesson);
-    const double share = std::max(count[-bin] / count[bin], kLeastShare);
+    const double share = std::max(count[-bin] / count[bin], kLeastKept);
     credit[bin] += std::min(1.0, share);
     if (credit[bin] < 1.0) continue;
     credit[bin] -= 1.0;
@@ -218,7 +218,7 @@ double InsideReport::mean() const {
 
 namespace {
 
-constexpr double kDegrees = 57.29577951308232;
+constexpr double kDegreesPerRadian = 57.29577951308232;
 
 InsideReport letDrive(const simulation::Scenario& scenario, simulation::Setup setup,
                       const neural::NetworkFile& network, int seeds, int jobs) {
@@ -263,8 +263,8 @@ HumanReport humanExperiment(const simulation::Scenario& scenario, const simulati
     report.human_heading += drive.inside_heading / static_cast<double>(drives.size());
     std::move(drive.lessons.begin(), drive.lessons.end(), std::back_inserter(lessons));
   }
-  tell(told("human", report.human) + ", heading " + std::to_string(kDegrees * report.human_heading) +
-       " deg");
+  tell(told("human", report.human) + ", heading " +
+       std::to_string(kDegreesPerRadian * report.human_heading) + " deg");
   const auto taught = [&](bool corrected) {
     const DataSet data = examplesOf(lessons, corrected);
     return follow(recipe, &data, jobs, tell);

@@ -6,11 +6,11 @@
 namespace tunnel_pilot::simulation {
 namespace {
 
-constexpr double kSensedBehind = 5.0;        // sensed path begins so far behind the truck [m]
-constexpr double kSensedAhead = 40.0;        // full preview [m]
-constexpr double kSensedSpacing = 0.5;       // [m]
-constexpr double kNominalWidth = 9.0;  // a haul road's, told for completeness [m]
-constexpr double kUnlimited = 100.0;   // the speed is fixed: the governor has no say
+constexpr double kSensedBehind = 5.0;   // sensed path begins so far behind the truck [m]
+constexpr double kSensedAhead = 40.0;   // full preview [m]
+constexpr double kSensedSpacing = 0.5;  // [m]
+constexpr double kNominalWidth = 9.0;   // a haul road's, told for completeness [m]
+constexpr double kUnlimited = 100.0;    // the speed is fixed: the governor has no say
 
 PilotParameters withFixedSpeed(PilotParameters parameters, double speed) {
   parameters.preview_driver.speed = speed;
