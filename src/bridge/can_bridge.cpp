@@ -177,7 +177,7 @@ CanBridge::Answer CanBridge::reset(Stamp now) {
 
 void CanBridge::clockJumped(Stamp now) {
   link_.forgetTime();
-  sender_.forgetTime();
+  sender_.forgetTime(now);
   transmit_.forgetTime(now);
   asked_to_discard_.reset();
   odometry_.forgetTime();

@@ -8,9 +8,13 @@ namespace tunnel_pilot::bridge {
 
 CommandSender::CommandSender(double period) : period_(fromSeconds(period)) {}
 
-void CommandSender::forgetTime() {
+void CommandSender::forgetTime(Stamp now) {
   started_ = false;
-  sets_sent_ = 0;
+  if (sets_sent_ == 0) return;
+  // As if the last set had been sent right now: a little strict, and a clock that jumps on and on is
+  // bounded.
+  const Stamp shift = now - sent_at_[(sets_sent_ - 1) % kMaxFrames];
+  for (Stamp& at : sent_at_) at += shift;
 }
 
 bool CommandSender::due(bool stop, Stamp now) const {

@@ -11,7 +11,8 @@
 namespace tunnel_pilot::shell {
 namespace {
 
-constexpr double kTickPeriod = 0.005;  // [s] steady time
+constexpr double kTickPeriod = 0.005;    // [s] steady time
+constexpr std::uint32_t kCommands = 10;  // that may wait: a newer one must not push a stop out
 constexpr Stamp kStatusPeriod = std::chrono::milliseconds(100);
 
 Stamp steadyNow() { return std::chrono::steady_clock::now().time_since_epoch(); }
@@ -42,7 +43,7 @@ CanBridgeRos::CanBridgeRos(ros::NodeHandle nh, ros::NodeHandle private_nh) {
     advertiseEdge(nh, "reset", &bridge::CanBridge::reset);
   }
   const auto hints = ros::TransportHints().tcpNoDelay();
-  command_subscriber_ = nh.subscribe("command", 1, &CanBridgeRos::onCommand, this, hints);
+  command_subscriber_ = nh.subscribe("command", kCommands, &CanBridgeRos::onCommand, this, hints);
   if (ros::Time::isSimTime()) {
     clock_subscriber_ = nh.subscribe<rosgraph_msgs::Clock>(
         "/clock", 10, [this](const rosgraph_msgs::Clock::ConstPtr& m) { tick(toCore(m->clock)); },

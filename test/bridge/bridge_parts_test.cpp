@@ -546,6 +546,29 @@ TEST(CommandSender, BlocksTheSeventeenthFrameOfAQuarterSecond) {
   EXPECT_EQ(sender.setsBlocked(), 1u);
 }
 
+TEST(CommandSender, IsBoundThoughTheClockJumpsAgainAndAgain) {
+  can::MemoryBusHub hub;
+  const auto bus = hub.connect();
+  CommandSender sender(0.02);
+  int sent = 0;
+  for (int i = 0; i < 100; ++i) {  // within no time at all
+    const Stamp now = ms(i % 2 == 0 ? 100000 : 5000);
+    sender.forgetTime(now);
+    if (sender.due(false, now) && sender.send({}, {}, {}, *bus, now)) ++sent;
+  }
+  EXPECT_EQ(sent, 16);
+}
+
+TEST(CommandSender, ADriveAtItsPaceSendsAtOnceAfterAClockJump) {
+  can::MemoryBusHub hub;
+  const auto bus = hub.connect();
+  CommandSender sender(0.02);
+  for (int i = 0; i < 50; ++i) EXPECT_TRUE(sender.send({}, {}, {}, *bus, ms(20 * i)));
+  sender.forgetTime(ms(3));
+  EXPECT_TRUE(sender.due(false, ms(3)));
+  EXPECT_TRUE(sender.send({}, {}, {}, *bus, ms(3)));
+}
+
 TEST(CommandSender, ASetThatCannotBeEncodedFailsAndNothingOfItIsSent) {
   can::MemoryBusHub hub;
   const auto bus = hub.connect(), wire = hub.connect();

@@ -27,8 +27,8 @@ class CommandSender {
   bool send(can::TruckCommandFrame command, can::CommandInfoFrame info, can::BridgeStatusFrame status,
             can::Bus& bus, Stamp now);
 
-  /// Begins a new time base: the next set is due at once.
-  void forgetTime();
+  /// Begins a new time base at `now`: the next set is due at once, if the bound on the rate allows it.
+  void forgetTime(Stamp now);
 
   bool broken() const { return failed_in_row_ >= 3; }  ///< three sets in a row could not be sent
   std::uint32_t framesSent() const { return frames_sent_; }
