@@ -7,14 +7,14 @@
 namespace tunnel_pilot::shell {
 namespace {
 
-constexpr double kPeriod = 0.02;  // [s]
+constexpr double kBeatPeriod = 0.02;  // [s]
 
 }  // namespace
 
 Heartbeat::Heartbeat(ros::NodeHandle nh, std::string node)
     : node_(std::move(node)), publisher_(nh.advertise<tunnel_pilot::Heartbeat>("heartbeat", 5)) {
   timer_ =
-      nh.createWallTimer(ros::WallDuration(kPeriod), [this](const ros::WallTimerEvent&) { beat(); });
+      nh.createWallTimer(ros::WallDuration(kBeatPeriod), [this](const ros::WallTimerEvent&) { beat(); });
 }
 
 void Heartbeat::beat() {

@@ -27,7 +27,7 @@ constexpr double kBarShare = 0.7;          // of the way to the next bar, wide w
 constexpr double kFanLifetime = 0.5;       // [s] ROS time
 constexpr double kTextHeight = 0.85;       // of a line [m]
 constexpr double kTextLifetime = 5.0;      // a dead pilot's last words are not kept [s] ROS time
-constexpr double kStatusPeriod = 0.1;      // [s] steady time
+constexpr double kTextPeriod = 0.1;        // [s] steady time
 constexpr double kCorridorPeriod = 0.04;   // [s] steady time
 constexpr double kSilent = 1.0;            // what is older is not told any more [s]
 
@@ -242,7 +242,7 @@ MarkersRos::MarkersRos(ros::NodeHandle nh, ros::NodeHandle private_nh) {
   network_subscriber_ = nh.subscribe("lidar_driver/proposal", 1, &MarkersRos::onNetwork, this);
   status_subscriber_ = nh.subscribe("truck_status", 1, &MarkersRos::onTruckStatus, this);
   odometry_subscriber_ = nh.subscribe("odom", 1, &MarkersRos::onOdometry, this);
-  timer_ = nh.createWallTimer(ros::WallDuration(kStatusPeriod),
+  timer_ = nh.createWallTimer(ros::WallDuration(kTextPeriod),
                               [this](const ros::WallTimerEvent&) { publishStatus(); });
 }
 

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kLeastWatch = 2.0;    // [s] steady time
 constexpr double kLongestWatch = 5.0;  // [s] steady time
-constexpr double kTick = 0.001;        // [s] steady time
+constexpr double kPoll = 0.001;        // [s] steady time
 constexpr std::uint32_t kQueue = 1000;
 
 template <class Message>
@@ -75,7 +75,7 @@ void PilotWatch::watch() {
   bool mounted = false;
   while (ros::ok()) {
     ros::spinOnce();
-    ros::WallDuration(kTick).sleep();
+    ros::WallDuration(kPoll).sleep();
     const ros::Time now = ros::Time::now();
     if (!first && !now.isZero()) first = now;
     facts_.clock_passed = first ? (now - *first).toSec() : 0.0;

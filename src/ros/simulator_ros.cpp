@@ -24,7 +24,7 @@ constexpr Stamp kClockPeriod = std::chrono::milliseconds(10);
 constexpr Stamp kFramePeriod = std::chrono::milliseconds(20);
 constexpr Stamp kObstaclePeriod = std::chrono::milliseconds(50);
 constexpr double kLongestPoll = 0.02;    // [s] steady time, the rest of a longer one was not ours
-constexpr double kWallHeight = 1.5;      // of the pictured walls [m]
+constexpr double kPicturedHeight = 1.5;  // of the pictured walls [m]
 constexpr double kObstacleHeight = 1.7;  // of the pictured obstacles [m]
 
 // True when the step from `before` to `now` reached another multiple of the period.
@@ -310,9 +310,9 @@ void SimulatorRos::publishWalls() {
   auto edges = marker("true_walls", 1, Marker::LINE_LIST, 0.75F, 0.75F, 0.8F, 0.5F);
   edges.scale.x = 0.06;
   for (const auto& chain : simulator_->world().walls) {
-    addFaces(chain, kWallHeight, faces);
+    addFaces(chain, kPicturedHeight, faces);
     addEdges(chain, 0.0, edges);
-    addEdges(chain, kWallHeight, edges);
+    addEdges(chain, kPicturedHeight, edges);
   }
   MarkerArray markers;
   if (!edges.points.empty()) markers.markers = {faces, edges};

@@ -5,7 +5,7 @@
 namespace tunnel_pilot::shell {
 namespace {
 
-constexpr double kPeriod = 1.0;          // [s]
+constexpr double kLinePeriod = 1.0;      // [s]
 constexpr std::size_t kHashDigits = 12;  // shown of a SHA-256
 
 void add(const std::string& part, const char* separator, std::string& line) {
@@ -63,7 +63,7 @@ bool StatusPace::due(const StatusInput& input, double now) {
     told_ = "\n\n";
     told_at_ = now;
   }
-  if (key == told_ && now - *told_at_ < kPeriod) return false;
+  if (key == told_ && now - *told_at_ < kLinePeriod) return false;
   told_ = key;
   told_at_ = now;
   return true;
