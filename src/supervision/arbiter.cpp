@@ -205,10 +205,10 @@ void Arbiter::compareDrivers(Stamp now) {
   }
 }
 
-// No scan was accepted lately: do any come at all?
+// No scan was accepted lately: do any come at all? Bad ones may come more seldom than good ones.
 Reason Arbiter::whyNoScan(Stamp now) const {
   const bool accepted = age(scan_received_, now) <= parameters_.scan_degraded_age;
-  const bool come = age(rejection_received_, now) <= parameters_.scan_degraded_age;
+  const bool come = age(rejection_received_, now) <= 2.0 * parameters_.scan_degraded_age;
   if (accepted || !come) return Reason::kScanStale;
   return rejection_.frozen ? Reason::kScanFrozen : Reason::kScanRejected;
 }

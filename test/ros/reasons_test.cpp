@@ -173,8 +173,9 @@ class Reasons : public ::testing::Test {
   }
 
   // From the first message that gives the reason until each channel has told it.
+  // `just_started`: who listens to the log is not yet connected to such a process; its terminal has it.
   static void expectTold(Reason reason, const std::vector<std::string>& finders,
-                         const std::function<void()>& provoke) {
+                         const std::function<void()>& provoke, bool just_started = false) {
     Channels& channels = rig().channels;
     channels.listenFor(reason, finders);
     provoke();
@@ -182,6 +183,7 @@ class Reasons : public ::testing::Test {
         << "never given: " << toString(reason) << "; the truck's is " << status().reason_text;
     spinUntil([&] { return channels.allTold() || channels.sinceItStands() > 2.0 * kLimit; }, 10.0);
     for (const auto& [channel, delay] : channels.takeDelays()) {
+      if (just_started && channel == "log") continue;
       EXPECT_LE(delay, kLimit) << channel << " has not told in time: " << toString(reason) << "\n"
                                << channels.lately();
     }
@@ -206,7 +208,8 @@ Rig* Reasons::rig_ = nullptr;
 TEST_F(Reasons, StartingUpWhileTheTruckIsNotHeard) {
   rig().wire.set(WireFault::kSilent);
   ASSERT_TRUE(spinUntil([] { return rig().channels.hearsArbiter(); }));
-  expectToldByBridge(Reason::kStartUp, [] { rig().bridge.start(); });
+  expectTold(
+      Reason::kStartUp, {"can_bridge"}, [] { rig().bridge.start(); }, true);
 }
 
 TEST_F(Reasons, NotEngagedOnceAllIsHealthy) {
