@@ -73,7 +73,7 @@ class SpoiltWire {
         change<can::TruckFeedbackFrame>(frame, [](auto& told) { told.operator_override = true; });
         break;
       case WireFault::kHingeElsewhere:
-        change<can::TruckFeedbackFrame>(frame, [](auto& told) { told.articulation_angle += 0.2; });
+        change<can::TruckFeedbackFrame>(frame, [](auto& told) { told.articulation_angle += 0.11; });
         break;
     }
     pilot_.send(frame);

@@ -261,7 +261,7 @@ TEST_F(Reasons, ObstacleWithinTheStoppingDistance) {
 
 // ---- the truck and its bus
 
-TEST_F(Reasons, DISABLED_TheSteeringDoesNotFollowItsCommand) {
+TEST_F(Reasons, TheSteeringDoesNotFollowItsCommand) {
   drive();
   expectTold(Reason::kTrackingError, {"arbiter", "can_bridge"},
              [] { rig().wire.set(WireFault::kHingeElsewhere); });
@@ -325,19 +325,19 @@ TEST_F(Reasons, NoFreshCommand) {
 // ---- the drivers. What the real ones do not do when asked is put in their place at the arbiter's
 // input.
 
-TEST_F(Reasons, DISABLED_LowConfidenceOfTheDriver) {
+TEST_F(Reasons, LowConfidenceOfTheDriver) {
   ASSERT_TRUE(unload("lidar_driver"));
   drive();
   expectToldByArbiter(Reason::kLowConfidence, [] { rig().understudy.play(Part::kUnsureLidarDriver); });
 }
 
-TEST_F(Reasons, DISABLED_TheDriversDisagree) {
+TEST_F(Reasons, TheDriversDisagree) {
   rig().understudy.play(Part::kLidarDriver);
   drive();
   expectToldByArbiter(Reason::kDriversDisagree, [] { rig().understudy.play(Part::kOtherLidarDriver); });
 }
 
-TEST_F(Reasons, DISABLED_TheDriversProposalIsTooOld) {
+TEST_F(Reasons, TheDriversProposalIsTooOld) {
   drive();
   expectToldByArbiter(Reason::kSourceStale, [] { ASSERT_TRUE(unload("preview_driver")); });
 }
@@ -348,14 +348,14 @@ TEST_F(Reasons, DISABLED_NoHealthyDriver) {
   expectToldByArbiter(Reason::kNoSource, [] { rig().understudy.play(Part::kUnablePreviewDriver); });
 }
 
-TEST_F(Reasons, DISABLED_TheDriversProposalIsNotAPossibleCommand) {
+TEST_F(Reasons, TheDriversProposalIsNotAPossibleCommand) {
   rig().understudy.play(Part::kPreviewDriver);
   drive();
   expectToldByArbiter(Reason::kProposalInvalid,
                       [] { rig().understudy.play(Part::kImpossiblePreviewDriver); });
 }
 
-TEST_F(Reasons, DISABLED_LimitsHitAgainAndAgain) {
+TEST_F(Reasons, LimitsHitAgainAndAgain) {
   rig().understudy.play(Part::kPreviewDriver);
   drive();
   expectToldByArbiter(Reason::kLimitsHit, [] { rig().understudy.play(Part::kWildPreviewDriver); });
@@ -363,13 +363,13 @@ TEST_F(Reasons, DISABLED_LimitsHitAgainAndAgain) {
 
 // ---- processes that die
 
-TEST_F(Reasons, DISABLED_NoMotionFeedbackOfADeadBridge) {
+TEST_F(Reasons, NoMotionFeedbackOfADeadBridge) {
   rig().understudy.play(Part::kPreviewDriver);
   drive();
   expectToldByArbiter(Reason::kMotionStale, [] { rig().bridge.end(SIGKILL); });
 }
 
-TEST_F(Reasons, DISABLED_AProcessOfThePilotIsSilent) {
+TEST_F(Reasons, AProcessOfThePilotIsSilent) {
   ASSERT_TRUE(load("preview_driver"));
   ASSERT_TRUE(load("lidar_driver"));  // without which the truck would drive on
   ros::param::set("can_bridge/heartbeats", std::vector<std::string>{"lidar_driver"});
@@ -382,7 +382,7 @@ TEST_F(Reasons, DISABLED_AProcessOfThePilotIsSilent) {
 
 // Last, for a truck under way is not let off again. The walls are the real ones; the margin becomes
 // wider than what is left beside the truck.
-TEST_F(Reasons, DISABLED_TooLittleClearanceToAWall) {
+TEST_F(Reasons, TooLittleClearanceToAWall) {
   ASSERT_TRUE(load("lidar_driver"));
   drive();
   expectToldByArbiter(Reason::kClearance, [] {
