@@ -128,6 +128,7 @@ class Channels {
   Channels() {
     hear<ArbiterState>("arbiter_state", [this](const ArbiterState& m) {
       hears_arbiter_ = true;
+      arbiter_is_content_ = m.reason == static_cast<std::uint8_t>(supervision::Reason::kNone);
       given("arbiter", m.reason);
     });
     hear<TruckStatus>("truck_status", [this](const TruckStatus& m) {
@@ -161,10 +162,11 @@ class Channels {
   }
 
   bool hearsArbiter() const { return hears_arbiter_; }
+  bool arbiterIsContent() const { return arbiter_is_content_; }
   const TruckStatus& truck() const { return truck_; }
 
-  /// When the finder's own topic first gave the reason.
-  const std::optional<ros::Time>& stands() const { return stands_; }
+  /// The finder's own topic has given the reason since listenFor().
+  bool stands() const { return stands_.has_value(); }
   double sinceItStands() const { return (ros::Time::now() - *stands_).toSec(); }
   bool allTold() const {
     const auto told = [this](const std::string& channel) { return told_.count(channel) > 0; };
@@ -253,7 +255,7 @@ class Channels {
 #ifdef TUNNEL_PILOT_HUD
   Hud hud_;
 #endif
-  bool hears_arbiter_ = false;
+  bool hears_arbiter_ = false, arbiter_is_content_ = false;
   TruckStatus truck_;
   supervision::Reason reason_ = supervision::Reason::kNone;
   std::string words_ = "no reason yet";

@@ -19,6 +19,7 @@
 
 #include <csignal>
 #include <limits>
+#include <set>
 
 #include "reasons_channels.h"
 #include "reasons_faults.h"
@@ -28,15 +29,18 @@ namespace {
 
 using supervision::Reason;
 
-constexpr double kLimit = 1.0;         // for every channel [s] ROS time
-constexpr double kUnderway = 0.3;      // [m/s]
+constexpr double kLimit = 1.0;      // for every channel [s] ROS time
+constexpr double kUnderway = 0.3;   // [m/s]
+constexpr double kDrivesFor = 0.1;  // until the truck is taken as driving [s] ROS time
+constexpr int kAttempts = 4;
 constexpr double kTrackLength = 24.0;  // of the straight that is used, from the start [m]
 
 /// The bridge, a process that the test may kill.
 class Bridge {
  public:
   ~Bridge() { end(SIGINT); }
-  void start() {
+  void startUnlessRunning() {
+    if (process_ > 0) return;
     process_ = fork();
     if (process_ != 0) return;
     const std::string program = std::string(TUNNEL_PILOT_NODE_FOLDER) + "/can_bridge";
@@ -62,12 +66,18 @@ struct Rig {
             "simulator/truth", 50, [this](const SimulatorTruth::ConstPtr& m) { truth = *m; })),
         clock(nh.advertise<rosgraph_msgs::Clock>("/clock", 10)) {}
 
+  void clear() {
+    wire.set(WireFault::kNone);
+    lidar.set(View::kClear);
+  }
+
   ros::NodeHandle nh;
   SpoiltWire wire;
   SpoiltLidar lidar;
   Understudy understudy;
   Channels channels;
   Bridge bridge;
+  std::set<std::string> unloaded;  // stages
   SimulatorTruth truth;
   ros::Subscriber truth_subscriber;
   ros::Publisher clock;
@@ -82,8 +92,7 @@ class Reasons : public ::testing::Test {
   }
 
   ~Reasons() override {
-    rig().wire.set(WireFault::kNone);
-    rig().lidar.set(View::kClear);
+    rig().clear();
     rig().understudy.play(Part::kNone);
   }
 
@@ -107,15 +116,18 @@ class Reasons : public ::testing::Test {
     return trigger.response;
   }
 
-  static bool load(const std::string& stage) {
+  static void loadUnlessLoaded(const std::string& stage) {
+    if (rig().unloaded.count(stage) == 0) return;
     nodelet::NodeletLoad load;
     load.request.name = "/" + stage;
     load.request.type = "tunnel_pilot/" + stage;
-    return ros::service::call("pilot_manager/load_nodelet", load) && load.response.success;
+    ASSERT_TRUE(ros::service::call("pilot_manager/load_nodelet", load) && load.response.success);
+    rig().unloaded.erase(stage);
   }
   static bool unload(const std::string& stage) {
     nodelet::NodeletUnload unload;
     unload.request.name = "/" + stage;
+    rig().unloaded.insert(stage);
     return ros::service::call("pilot_manager/unload_nodelet", unload) && unload.response.success;
   }
 
@@ -156,12 +168,18 @@ class Reasons : public ::testing::Test {
 
   static void drive(double speed = kUnderway) {
     ros::SteadyTime next;
+    std::optional<ros::Time> drives_since;
+    const auto drives = [&] {
+      return rig().truth.speed > speed && status().state == TruckStatus::STATE_ACTIVE &&
+             rig().channels.arbiterIsContent() && rig().truth.station < 14.0 + kTrackLength;
+    };
     ASSERT_TRUE(spinUntil(
         [&] {
-          if (rig().truth.speed > speed && status().state == TruckStatus::STATE_ACTIVE &&
-              rig().truth.station < 14.0 + kTrackLength) {
-            return true;
+          if (drives()) {
+            if (!drives_since) drives_since = ros::Time::now();
+            return (ros::Time::now() - *drives_since).toSec() > kDrivesFor;
           }
+          drives_since.reset();
           if (ros::SteadyTime::now() < next) return false;
           next = ros::SteadyTime::now() + ros::WallDuration(0.1);
           operate();
@@ -172,15 +190,19 @@ class Reasons : public ::testing::Test {
         << rig().truth.speed << " m/s at " << rig().truth.station << " m";
   }
 
+  /// What makes a reason, and who finds it.
+  struct Cause {
+    std::vector<std::string> finders;
+    std::function<void()> provoke;
+    std::function<void()> prepare = [] {};  ///< before the truck drives
+    double speed = kUnderway;               ///< to drive at [m/s]
+    std::function<void()> end = [] {};
+  };
+
   // From the first message that gives the reason until each channel has told it.
   // `just_started`: who listens to the log is not yet connected to such a process; its terminal has it.
-  static void expectTold(Reason reason, const std::vector<std::string>& finders,
-                         const std::function<void()>& provoke, bool just_started = false) {
+  static void expectChannelsTell(Reason reason, bool just_started = false) {
     Channels& channels = rig().channels;
-    channels.listenFor(reason, finders);
-    provoke();
-    ASSERT_TRUE(spinUntil([&] { return channels.stands().has_value(); }))
-        << "never given: " << toString(reason) << "; the truck's is " << status().reason_text;
     spinUntil([&] { return channels.allTold() || channels.sinceItStands() > 2.0 * kLimit; }, 10.0);
     for (const auto& [channel, delay] : channels.takeDelays()) {
       if (just_started && channel == "log") continue;
@@ -190,11 +212,47 @@ class Reasons : public ::testing::Test {
     EXPECT_EQ(0u, rig().truth.contacts);
   }
 
+  // On a machine that holds processes up, the truck may stop for that before the cause is found; then
+  // the cause comes again.
+  static void expectTold(Reason reason, const Cause& cause) {
+    bool told = false;
+    for (int attempt = 0; attempt < kAttempts && !told; ++attempt) {
+      ASSERT_NO_FATAL_FAILURE(cause.prepare());
+      ASSERT_NO_FATAL_FAILURE(drive(cause.speed));
+      rig().channels.listenFor(reason, cause.finders);
+      ASSERT_NO_FATAL_FAILURE(cause.provoke());
+      const auto stands = [&] { return rig().channels.stands(); };
+      spinUntil([&] { return stands() || status().state == TruckStatus::STATE_STOPPED; }, 10.0);
+      told = stands();
+      if (told) expectChannelsTell(reason);
+      cause.end();
+      rig().clear();
+    }
+    ASSERT_TRUE(told) << "never given: " << toString(reason) << "; the truck's is "
+                      << status().reason_text;
+  }
+
   static void expectToldByArbiter(Reason reason, const std::function<void()>& provoke) {
-    expectTold(reason, {"arbiter"}, provoke);
+    expectTold(reason, {{"arbiter"}, provoke});
   }
   static void expectToldByBridge(Reason reason, const std::function<void()>& provoke) {
-    expectTold(reason, {"can_bridge"}, provoke);
+    expectTold(reason, {{"can_bridge"}, provoke});
+  }
+
+  static void expectToldOfPart(Reason reason, Part at_first, Part then) {
+    expectTold(
+        reason,
+        {{"arbiter"}, [&] { rig().understudy.play(then); }, [&] { rig().understudy.play(at_first); }});
+  }
+
+  // Before the truck drives, or by driving itself.
+  static void expectToldAtOnce(Reason reason, const std::function<void()>& provoke,
+                               bool just_started = false) {
+    rig().channels.listenFor(reason, {"can_bridge"});
+    ASSERT_NO_FATAL_FAILURE(provoke());
+    ASSERT_TRUE(spinUntil([&] { return rig().channels.stands(); }))
+        << "never given: " << toString(reason) << "; the truck's is " << status().reason_text;
+    expectChannelsTell(reason, just_started);
   }
 
  private:
@@ -208,118 +266,114 @@ Rig* Reasons::rig_ = nullptr;
 TEST_F(Reasons, StartingUpWhileTheTruckIsNotHeard) {
   rig().wire.set(WireFault::kSilent);
   ASSERT_TRUE(spinUntil([] { return rig().channels.hearsArbiter(); }));
-  expectTold(
-      Reason::kStartUp, {"can_bridge"}, [] { rig().bridge.start(); }, true);
+  expectToldAtOnce(
+      Reason::kStartUp, [] { rig().bridge.startUnlessRunning(); }, true);
 }
 
 TEST_F(Reasons, NotEngagedOnceAllIsHealthy) {
-  expectToldByBridge(Reason::kNotEngaged, [] { rig().wire.set(WireFault::kNone); });
+  expectToldAtOnce(Reason::kNotEngaged, [] { rig().wire.set(WireFault::kNone); });
 }
 
 TEST_F(Reasons, DrivingAsAsked) {
-  expectToldByBridge(Reason::kNone, [] { drive(); });
+  expectToldAtOnce(Reason::kNone, [] { drive(); });
 }
 
 // ---- the operator
 
 TEST_F(Reasons, StoppedByTheOperator) {
-  drive();
   expectToldByBridge(Reason::kOperatorStop, [] { call("stop"); });
 }
 
 TEST_F(Reasons, ReleasedByTheOperator) {
-  drive();
   expectToldByBridge(Reason::kOperatorRelease, [] { call("release"); });
 }
 
 // ---- the lidar and what it sees
 
 TEST_F(Reasons, NoValidTunnel) {
-  drive();
   expectToldByArbiter(Reason::kTunnelInvalid, [] { rig().lidar.set(View::kOpen); });
 }
 
 TEST_F(Reasons, NoLidarScan) {
-  drive();
   expectToldByArbiter(Reason::kScanStale, [] { rig().lidar.set(View::kDead); });
 }
 
 TEST_F(Reasons, LidarScansAreRejected) {
-  drive();
   expectToldByArbiter(Reason::kScanRejected, [] { rig().lidar.set(View::kBlind); });
 }
 
 TEST_F(Reasons, TheLidarRepeatsTheSameScan) {
-  drive();
   expectToldByArbiter(Reason::kScanFrozen, [] { rig().lidar.set(View::kFrozen); });
 }
 
 TEST_F(Reasons, ObstacleWithinTheStoppingDistance) {
-  drive(1.5);
-  expectToldByArbiter(Reason::kObstacle, [] { rig().lidar.set(View::kBox); });
+  expectTold(Reason::kObstacle, {{"arbiter"}, [] { rig().lidar.set(View::kBox); }, [] {}, 1.5});
 }
 
 // ---- the truck and its bus
 
 TEST_F(Reasons, TheSteeringDoesNotFollowItsCommand) {
-  drive();
-  expectTold(Reason::kTrackingError, {"arbiter", "can_bridge"},
-             [] { rig().wire.set(WireFault::kHingeElsewhere); });
+  expectTold(Reason::kTrackingError,
+             {{"arbiter", "can_bridge"}, [] { rig().wire.set(WireFault::kHingeElsewhere); }});
 }
 
 TEST_F(Reasons, NoFreshFramesFromTheTruck) {
-  drive();
   expectToldByBridge(Reason::kFeedbackStale, [] { rig().wire.set(WireFault::kSilent); });
 }
 
 TEST_F(Reasons, FramesFromTheTruckAreCorrupt) {
-  drive();
   expectToldByBridge(Reason::kFeedbackCorrupt, [] { rig().wire.set(WireFault::kCorrupt); });
 }
 
 TEST_F(Reasons, CanBusFault) {
-  drive();
   expectToldByBridge(Reason::kBusFault, [] { rig().wire.set(WireFault::kForeignSender); });
 }
 
 TEST_F(Reasons, TheTruckReportsAFault) {
-  drive();
   expectToldByBridge(Reason::kTruckFault, [] { rig().wire.set(WireFault::kTruckFault); });
 }
 
 TEST_F(Reasons, TheOperatorTookOver) {
-  drive();
   expectToldByBridge(Reason::kOperatorOverride, [] { rig().wire.set(WireFault::kOverride); });
 }
 
 // ---- clock and processes
 
 TEST_F(Reasons, TheClockJumped) {
-  drive();
   ASSERT_TRUE(spinUntil([] { return rig().clock.getNumSubscribers() > 2; }));
-  std_srvs::SetBool pause;
-  pause.request.data = true;
-  ASSERT_TRUE(ros::service::call("simulator/pause", pause));
-  spinUntil([] { return false; }, 0.2);  // what was under way
+  const auto pause = [](bool pauses) {
+    std_srvs::SetBool request;
+    request.request.data = pauses;
+    ASSERT_TRUE(ros::service::call("simulator/pause", request));
+  };
   // The simulator's clock stands; ours goes on a second earlier.
   rosgraph_msgs::Clock message;
-  message.clock = ros::Time::now() - ros::Duration(1.0);
-  const ros::WallTimer goes_on =
-      rig().nh.createWallTimer(ros::WallDuration(0.01), [&](const ros::WallTimerEvent&) {
+  ros::WallTimer goes_on = rig().nh.createWallTimer(
+      ros::WallDuration(0.01),
+      [&](const ros::WallTimerEvent&) {
         message.clock += ros::Duration(0.01);
         rig().clock.publish(message);
-      });
-  expectToldByBridge(Reason::kClockJump, [] {});
-  pause.request.data = false;
-  ASSERT_TRUE(ros::service::call("simulator/pause", pause));
+      },
+      false, false);
+  Cause cause{{"can_bridge"}, [&] {
+                pause(true);
+                spinUntil([] { return false; }, 0.2);  // what was under way
+                message.clock = ros::Time::now() - ros::Duration(1.0);
+                goes_on.start();
+              }};
+  cause.end = [&] {
+    goes_on.stop();
+    pause(false);
+  };
+  expectTold(Reason::kClockJump, cause);
 }
 
 TEST_F(Reasons, NoFreshCommand) {
-  drive();
   const pid_t manager = processOf("/pilot_manager");
   ASSERT_GT(manager, 0);
-  expectToldByBridge(Reason::kCommandStale, [&] { kill(manager, SIGSTOP); });
-  kill(manager, SIGCONT);
+  Cause cause{{"can_bridge"}, [&] { kill(manager, SIGSTOP); }};
+  cause.end = [&] { kill(manager, SIGCONT); };
+  expectTold(Reason::kCommandStale, cause);
 }
 
 // ---- the drivers. What the real ones do not do when asked is put in their place at the arbiter's
@@ -327,64 +381,57 @@ TEST_F(Reasons, NoFreshCommand) {
 
 TEST_F(Reasons, LowConfidenceOfTheDriver) {
   ASSERT_TRUE(unload("lidar_driver"));
-  drive();
-  expectToldByArbiter(Reason::kLowConfidence, [] { rig().understudy.play(Part::kUnsureLidarDriver); });
+  expectToldOfPart(Reason::kLowConfidence, Part::kNone, Part::kUnsureLidarDriver);
 }
 
 TEST_F(Reasons, TheDriversDisagree) {
-  rig().understudy.play(Part::kLidarDriver);
-  drive();
-  expectToldByArbiter(Reason::kDriversDisagree, [] { rig().understudy.play(Part::kOtherLidarDriver); });
+  expectToldOfPart(Reason::kDriversDisagree, Part::kLidarDriver, Part::kOtherLidarDriver);
 }
 
 TEST_F(Reasons, TheDriversProposalIsTooOld) {
-  drive();
-  expectToldByArbiter(Reason::kSourceStale, [] { ASSERT_TRUE(unload("preview_driver")); });
+  expectTold(Reason::kSourceStale, {{"arbiter"},
+                                    [] { ASSERT_TRUE(unload("preview_driver")); },
+                                    [] { loadUnlessLoaded("preview_driver"); }});
 }
 
 TEST_F(Reasons, DISABLED_NoHealthyDriver) {
-  rig().understudy.play(Part::kPreviewDriver);
-  drive();
-  expectToldByArbiter(Reason::kNoSource, [] { rig().understudy.play(Part::kUnablePreviewDriver); });
+  expectToldOfPart(Reason::kNoSource, Part::kPreviewDriver, Part::kUnablePreviewDriver);
 }
 
 TEST_F(Reasons, TheDriversProposalIsNotAPossibleCommand) {
-  rig().understudy.play(Part::kPreviewDriver);
-  drive();
-  expectToldByArbiter(Reason::kProposalInvalid,
-                      [] { rig().understudy.play(Part::kImpossiblePreviewDriver); });
+  expectToldOfPart(Reason::kProposalInvalid, Part::kPreviewDriver, Part::kImpossiblePreviewDriver);
 }
 
 TEST_F(Reasons, LimitsHitAgainAndAgain) {
-  rig().understudy.play(Part::kPreviewDriver);
-  drive();
-  expectToldByArbiter(Reason::kLimitsHit, [] { rig().understudy.play(Part::kWildPreviewDriver); });
+  expectToldOfPart(Reason::kLimitsHit, Part::kPreviewDriver, Part::kWildPreviewDriver);
 }
 
 // ---- processes that die
 
 TEST_F(Reasons, NoMotionFeedbackOfADeadBridge) {
   rig().understudy.play(Part::kPreviewDriver);
-  drive();
-  expectToldByArbiter(Reason::kMotionStale, [] { rig().bridge.end(SIGKILL); });
+  expectTold(
+      Reason::kMotionStale,
+      {{"arbiter"}, [] { rig().bridge.end(SIGKILL); }, [] { rig().bridge.startUnlessRunning(); }});
 }
 
 TEST_F(Reasons, AProcessOfThePilotIsSilent) {
-  ASSERT_TRUE(load("preview_driver"));
-  ASSERT_TRUE(load("lidar_driver"));  // without which the truck would drive on
+  rig().bridge.end(SIGKILL);
   ros::param::set("can_bridge/heartbeats", std::vector<std::string>{"lidar_driver"});
   ros::param::set("can_bridge/heartbeat_timeout", 0.5);  // of steady time: this machine may be busy
-  rig().bridge.start();
-  ASSERT_TRUE(spinUntil([] { return status().state == TruckStatus::STATE_STANDBY; }));
-  drive();
-  expectToldByBridge(Reason::kProcessSilent, [] { ASSERT_TRUE(unload("lidar_driver")); });
+  expectTold(Reason::kProcessSilent, {{"can_bridge"},
+                                      [] { ASSERT_TRUE(unload("lidar_driver")); },
+                                      [] {
+                                        loadUnlessLoaded("preview_driver");
+                                        loadUnlessLoaded("lidar_driver");
+                                        rig().bridge.startUnlessRunning();
+                                      }});
 }
 
 // Last, for a truck under way is not let off again. The walls are the real ones; the margin becomes
 // wider than what is left beside the truck.
 TEST_F(Reasons, TooLittleClearanceToAWall) {
-  ASSERT_TRUE(load("lidar_driver"));
-  drive();
+  loadUnlessLoaded("lidar_driver");
   expectToldByArbiter(Reason::kClearance, [] {
     dynamic_reconfigure::Reconfigure tuning;
     tuning.request.config.doubles.resize(1);
