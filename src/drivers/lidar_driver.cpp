@@ -57,6 +57,7 @@ LidarDriverParameters loadLidarDriver(config::Node node, const std::string& fold
   p.mirror = node.boolean("mirror");
   p.sure = node.number("sure", "1", 0.0, 1.0);
   p.bridge_time = node.number("bridge_time", "s", 0.0, 0.5);
+  p.small_lead_share = node.number("small_lead_share", "1", 0.1, 1.0);
   p.steering = loadSteeringEstimator(node);
   node.finish();
   return p;
@@ -162,7 +163,8 @@ LidarDriver::Refusal LidarDriver::steer(const geometry::Scan& scan, const Motion
   if (!answer) return Refusal::kNoBell;
   if (domain_) answer->confidence *= domain_->familiarity(inputs_.inverse());
   *answer = bridged(*answer, scan.stamp);
-  proposal.articulation_angle = steering_.give(answer->articulation, meets, now);
+  proposal.articulation_angle =
+      steering_.give(meets + softened(answer->articulation - meets), meets, now);
   proposal.speed = parameters_.speed;
   proposal.confidence = answer->confidence;
   return Refusal::kNone;
@@ -200,6 +202,13 @@ std::optional<LidarDriver::Answer> LidarDriver::decode() const {
   const neural::GaussianCode::Decoded decoded = code_->decode(outputs_.data());
   if (decoded.peaks == 0) return std::nullopt;
   return Answer{decoded.value, decoded.confidence};
+}
+
+// Answered as sharply as the plan does that the network has learned from, small errors make trucks swing
+// whose steering is slower or later than believed. Great ones are up to the steering's fastest rate.
+double LidarDriver::softened(double lead) const {
+  const double used = std::min(1.0, std::abs(lead) / parameters_.steering.lead);
+  return lead * (parameters_.small_lead_share + (1.0 - parameters_.small_lead_share) * used);
 }
 
 LidarDriver::Answer LidarDriver::bridged(const Answer& answer, Stamp stamp) {

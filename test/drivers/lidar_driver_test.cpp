@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -123,6 +124,31 @@ TEST(LidarDriver, AScanWithoutAReturnOrOfAnotherSizeIsRefused) {
   scan.ranges.assign(761, std::numeric_limits<float>::infinity());
   EXPECT_FALSE(driver.propose(scan, motionAt(1.03), fromSeconds(1.04)).valid);
   EXPECT_EQ(driver.refusal(), Refusal::kScan);
+}
+
+// What a truck that stands straight is told to do when the network answers `answer` [rad], whatever it
+// sees.
+double commandFor(double answer) {
+  neural::NetworkFile network = randomNetwork();
+  std::vector<double>& p = network.network.parameters();
+  std::fill(p.begin(), p.end(), 0.0);
+  neural::GaussianCode(31, network.output.first, network.output.spacing, network.output.width)
+      .encode(answer, &p[p.size() - 31]);
+  LidarDriverParameters exact = parameters();
+  exact.mirror = false;
+  exact.steering.dead_band = 0.0;
+  exact.steering.boost = 0.0;
+  LidarDriver driver(exact, vehicle::loadTruck(kConfig + "truck.yaml").geometry, network);
+  return proposeAt(driver, 1.0).articulation_angle;
+}
+
+TEST(LidarDriver, OfASmallLeadOnlyAShareIsCommandedAndOfTheLargestAll) {
+  const double most = parameters().steering.lead;
+  const double share = parameters().small_lead_share;
+  EXPECT_NEAR(commandFor(0.002), share * 0.002, 1e-4);
+  EXPECT_NEAR(commandFor(-0.5 * most), -0.5 * (share + 1.0) * 0.5 * most, 1e-4);
+  EXPECT_NEAR(commandFor(most), most, 1e-4);
+  EXPECT_NEAR(commandFor(0.2), most, 1e-9);
 }
 
 TEST(LidarDriver, ANetworkForOtherInputsOrOutputsIsRefused) {
