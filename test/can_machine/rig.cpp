@@ -161,8 +161,11 @@ bool Pilot::drive() {
   while (steadyTime() < end && state() != SafetyState::kActive) {
     sleepUntil(next_tick_);  // by then the frames of the tick before are out
     const Stamp now = steadyTime();
-    if (state() == SafetyState::kStopped && bridge->reset(now).accepted) event("reset", now);
-    if (state() == SafetyState::kStandby && bridge->engage(now).accepted) {
+    // Engaged a tick after the reset, which may send a set of its own: that would be on the bus after the
+    // engage, and tells of STANDBY.
+    if (state() == SafetyState::kStopped) {
+      if (bridge->reset(now).accepted) event("reset", now);
+    } else if (state() == SafetyState::kStandby && bridge->engage(now).accepted) {
       engaged_by_us = true;
       event("engage", now);
     }
