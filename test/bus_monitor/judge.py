@@ -418,9 +418,10 @@ class Judge:
     def _status(self, time, data, text):
         state, before = data >> 12 & 0xF, self.state
         self.state, self.state_time = state, time
+        could_steer = before is not None and self._may_steer(before)  # then: this state may end the operator's edge
         self._follow_edges(time, state, before)
         for command in self.pending:  # its own state was lost: one of its neighbours' must allow it
-            if not self._may_steer(state) and not (before is not None and self._may_steer(before)):
+            if not self._may_steer(state) and not could_steer:
                 self._find(command.time, 'c', 'steers', f'in {self.states[state]}', command.frame)
         self.pending = []
         command = self.last

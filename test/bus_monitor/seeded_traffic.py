@@ -228,8 +228,20 @@ def stop_without_driving(drive):
     drive.drive()
 
 
+def hangs_after_its_command(drive):
+    """What told the command's state does not come any more; the next state on the bus is that of a pilot that stopped."""
+    first = len(drive.items)
+    drive.cycle(ACTIVE)
+    drive.items[first:] = [item for item in drive.items[first:]
+                           if not (item[0] == 'frame' and item[2] in ('TP_COMMAND_INFO', 'TP_STATUS'))]
+    drive.run(STOPPED, 30, stop=True)
+    drive.reset()
+    drive.engage()
+    drive.drive()
+
+
 GOOD = [plain, lost_single_frames, repeated_commands, stop_and_go_again, stop_at_its_limit, override,
-        feedback_at_its_limit, full_rate, degraded, stop_without_driving]
+        feedback_at_its_limit, full_rate, degraded, stop_without_driving, hangs_after_its_command]
 
 
 # ---- bad ones: (name, expected finding, what is done to a drive that has started)
