@@ -58,6 +58,8 @@ class CanMachineJ1939 : public testing::Test {
   }
 
   void TearDown() override {
+    pilot.reset();
+    truck.reset();  // silence
     recorder.handOver(testing::UnitTest::GetInstance()->current_test_info()->name(), "j1939");
   }
 
