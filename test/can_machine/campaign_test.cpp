@@ -246,7 +246,9 @@ class CanMachineCampaign : public testing::Test {
     for (const Kind& kind : kinds) {
       std::printf("TABLE | %s | %d | %d | %d | ", kind.name, kind.count, kind.while_active, kind.stops);
       if (kind.answer == Answer::kStop) std::printf("%.1f", 1e3 * kind.stop);
-      std::printf(" | %.1f | %.0f |\n", 1e3 * kind.recovery, 1e3 * kind.age);
+      std::printf(" | ");
+      if (kind.answer != Answer::kDriveOn) std::printf("%.1f", 1e3 * kind.recovery);
+      std::printf(" | %.0f |\n", 1e3 * kind.age);
     }
   }
 
