@@ -7,6 +7,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <random>
@@ -210,7 +211,7 @@ class CanMachineCampaign : public testing::Test {
     kind.stop = std::max(kind.stop, stop);
   }
 
-  /// A confirmed frame in time, a bus that stays, nothing old, nothing armed.
+  /// A confirmed frame in time, nothing old, nothing armed.
   void expectRecovery(Kind& kind, Stamp begin, Stamp end, double limit) {
     const std::uint64_t confirmed = pilot->bus->confirmed();
     ASSERT_TRUE(pilot->run(5.0, [&] {
