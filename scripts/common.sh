@@ -124,7 +124,9 @@ configure() {
   local wanted="$PWD $*" stamp=$folder/configured
   if [ -f "$folder/Makefile" ] && [ "$(cat "$stamp" 2>/dev/null)" = "$wanted" ]; then return 0; fi
   rm -f "$stamp"
-  limited 600 cmake -S . -B "$folder" -DCMAKE_CXX_COMPILER_LAUNCHER=ccache "$@" || return
+  # Messages for C++ and Python alone: nothing here speaks the others.
+  ROS_LANG_DISABLE=genlisp:geneus:gennodejs limited 600 cmake -S . -B "$folder" \
+    -DCMAKE_CXX_COMPILER_LAUNCHER=ccache "$@" || return
   printf '%s\n' "$wanted" >"$stamp"
 }
 

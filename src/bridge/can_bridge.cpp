@@ -290,7 +290,11 @@ void CanBridge::listen(Stamp now) {
 }
 
 void CanBridge::clearBus(Stamp now) {
-  if (!busFaulty()) return;
+  if (!busFaulty()) {
+    if (bus_.confirmed() > confirmed_in_fault_) asked_to_discard_.reset();  // it has worked since
+    return;
+  }
+  confirmed_in_fault_ = bus_.confirmed();
   if (asked_to_discard_ && now - *asked_to_discard_ < kDiscardPeriod) return;
   asked_to_discard_ = now;
   bus_.discard();

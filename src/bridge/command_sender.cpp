@@ -18,7 +18,7 @@ void CommandSender::forgetTime(Stamp now) {
 }
 
 bool CommandSender::due(bool stop, Stamp now) const {
-  return !started_ || now >= next_ || (stop && !stop_told_);
+  return !started_ || now >= next_ - kEarly || (stop && !stop_told_);
 }
 
 bool CommandSender::withinRate(Stamp now) const {
@@ -41,7 +41,7 @@ bool CommandSender::send(can::TruckCommandFrame command, can::CommandInfoFrame i
     return false;
   }
   // In step with the period, but after a gap nothing is made up for.
-  const bool in_step = started_ && now >= next_ && now < next_ + period_;
+  const bool in_step = started_ && now >= next_ - kEarly && now < next_ + period_;
   next_ = (in_step ? next_ : now) + period_;
   started_ = true;
   command.counter = info.counter = status.counter = counter_ = can::nextCounter(counter_);

@@ -5,7 +5,9 @@
 #include <string>
 
 #include "tunnel_pilot/ros/conversions.h"
+#include "tunnel_pilot/ros/marker_shapes.h"
 #include "tunnel_pilot/ros/parameters.h"
+#include "tunnel_pilot/ros/stopping_markers.h"
 
 namespace tunnel_pilot::shell {
 namespace {
@@ -31,39 +33,11 @@ constexpr double kTextPeriod = 0.1;        // [s] steady time
 constexpr double kCorridorPeriod = 0.04;   // [s] steady time
 constexpr double kSilent = 1.0;            // what is older is not told any more [s]
 
-std_msgs::ColorRGBA color(float r, float g, float b, float a) {
-  std_msgs::ColorRGBA c;
-  c.r = r;
-  c.g = g;
-  c.b = b;
-  c.a = a;
-  return c;
-}
-
 const std_msgs::ColorRGBA kLeftColor = color(0.25F, 0.62F, 1.0F, 1.0F);
 const std_msgs::ColorRGBA kRightColor = color(1.0F, 0.55F, 0.15F, 1.0F);
 const std_msgs::ColorRGBA kPreviewColor = color(1.0F, 0.2F, 0.8F, 1.0F);
 const std_msgs::ColorRGBA kNetworkColor = color(0.35F, 0.95F, 0.95F, 0.9F);
 const std_msgs::ColorRGBA kPathColor = color(0.95F, 0.95F, 0.55F, 0.9F);
-
-Marker marker(const std_msgs::Header& header, const std::string& ns, int id, int type) {
-  Marker m;
-  m.header = header;
-  m.ns = ns;
-  m.id = id;
-  m.type = type;
-  m.action = Marker::ADD;
-  m.pose.orientation.w = 1.0;
-  return m;
-}
-
-Marker removal(const Marker& of) {
-  Marker m = of;
-  m.points.clear();
-  m.colors.clear();
-  m.action = Marker::DELETE;
-  return m;
-}
 
 geometry_msgs::Point raised(const geometry_msgs::Point32& point, double height) {
   geometry_msgs::Point p;
@@ -124,13 +98,6 @@ double distance(const geometry_msgs::Point32& point, const Wall& wall) {
   return least;
 }
 
-// Red at kNear, yellow halfway, green at kFar.
-std_msgs::ColorRGBA clearanceColor(double clearance) {
-  const double share = std::clamp((clearance - kNear) / (kFar - kNear), 0.0, 1.0);
-  return color(static_cast<float>(std::min(1.0, 2.0 - 2.0 * share)),
-               static_cast<float>(std::min(1.0, 2.0 * share)), 0.15F, 0.75F);
-}
-
 // The band between both edges, as two triangles a step.
 Marker corridor(const ArbiterState& state, const Walls& walls) {
   Marker band = marker(state.header, "corridor", 0, Marker::TRIANGLE_LIST);
@@ -142,7 +109,7 @@ Marker corridor(const ArbiterState& state, const Walls& walls) {
   const std::size_t count = std::min(left.size(), right.size());
   const auto add = [&](const geometry_msgs::Point32& point, const Wall& wall) {
     band.points.push_back(raised(point, 0.05));
-    band.colors.push_back(clearanceColor(distance(point, wall)));
+    band.colors.push_back(trafficColor(distance(point, wall), kNear, kFar));
   };
   for (std::size_t i = 0; i + 1 < count; ++i) {
     add(left[i], walls.left);
@@ -227,7 +194,9 @@ Marker statusMarker(const StatusText& status, double scale) {
 }  // namespace
 
 MarkersRos::MarkersRos(ros::NodeHandle nh, ros::NodeHandle private_nh) {
-  Parameters(private_nh).rest().finish();
+  Parameters parameters(private_nh);
+  front_overhang_ = takeTruck(parameters).geometry.front_overhang;
+  parameters.rest().finish();
   std_msgs::Header odom;
   odom.frame_id = kOdomFrame;
   driven_path_ = marker(odom, "driven_path", 0, Marker::LINE_STRIP);
@@ -269,6 +238,7 @@ void MarkersRos::onArbiterState(const ArbiterState& message) {
   if (!isSeen() || (now - corridor_drawn_).toSec() < kCorridorPeriod) return;
   corridor_drawn_ = now;
   MarkerArray markers;
+  markers.markers = stoppingMarkers(message, front_overhang_);
   markers.markers.push_back(corridor(message, walls_));
   publisher_.publish(markers);
 }

@@ -1,12 +1,16 @@
 #include "tunnel_pilot/rviz/panel.h"
 
+#include <ros/package.h>
+
 #include <QDir>
+#include <QFile>
 #include <QFileDialog>
 #include <QGridLayout>
 #include <QLabel>
 #include <QLineEdit>
 #include <QPushButton>
 #include <QVBoxLayout>
+#include <QXmlStreamReader>
 #include <pluginlib/class_list_macros.hpp>
 
 #include "tunnel_pilot/rviz/bag_recorder.h"
@@ -15,20 +19,19 @@
 namespace tunnel_pilot::hud {
 namespace {
 
-// What `replay.launch` and `extract` need, and what tells afterwards why the truck did what it did.
-const QStringList kTopics{"scan",
-                          "joint_states",
-                          "odom",
-                          "/tf",
-                          "/tf_static",
-                          "tunnel_state",
-                          "centerline",
-                          "lidar_driver/proposal",
-                          "preview_driver/proposal",
-                          "arbiter_state",
-                          "command",
-                          "truck_status",
-                          "/diagnostics"};
+// The topics that record.launch records; none where there is no such file.
+QStringList topicsOfRecordLaunch() {
+  QFile file(QString::fromStdString(ros::package::getPath("tunnel_pilot")) + "/launch/record.launch");
+  file.open(QIODevice::ReadOnly);
+  QXmlStreamReader xml(&file);
+  while (!xml.atEnd()) {
+    if (xml.readNext() != QXmlStreamReader::StartElement || xml.name() != QLatin1String("arg")) continue;
+    const auto attributes = xml.attributes();
+    if (attributes.value("name") != QLatin1String("topics")) continue;
+    return attributes.value("default").toString().simplified().split(' ');
+  }
+  return {};
+}
 
 void tell(QLabel& label, bool good, const QString& words) {
   label.setStyleSheet(good ? "color: #1f7a45" : "color: #b3261e");
@@ -50,7 +53,7 @@ QLabel* makeLabel(const char* name) {
 
 Panel::Panel(QWidget* parent)
     : rviz::Panel(parent),
-      topics_(kTopics),
+      topics_(topicsOfRecordLaunch()),
       caller_(new ServiceCaller(this)),
       recorder_(new BagRecorder(this)),
       answer_(makeLabel("answer")) {

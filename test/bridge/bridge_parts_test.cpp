@@ -459,6 +459,16 @@ TEST(TransmitWatch, StallsWhenTheOldestFrameIs35MillisecondsOld) {
   EXPECT_TRUE(watch.stalled());
 }
 
+TEST(TransmitWatch, StallsAtATickOf5MillisecondsThatComesALittleEarly) {
+  TransmitWatch watch;
+  constexpr Stamp kJitter = std::chrono::microseconds(100);
+  watch.sent(3, kJitter);
+  watch.update(3, ms(30) - kJitter);
+  EXPECT_FALSE(watch.stalled());
+  watch.update(3, ms(35) - kJitter);
+  EXPECT_TRUE(watch.stalled());
+}
+
 TEST(TransmitWatch, SetsOfDifferentSizesAreSettledInTheirOrder) {
   TransmitWatch watch;
   watch.sent(1, ms(0));
@@ -507,6 +517,22 @@ TEST(TransmitWatch, ASetOfWhichNothingWasTakenIsNotOnItsWay) {
 }
 
 // -------- sender
+
+TEST(CommandSender, KeepsItsPeriodThoughTicksComeALittleEarlyOrLate) {
+  CommandSender sender(0.02);
+  can::MemoryBusHub hub;
+  const auto bus = hub.connect();
+  constexpr Stamp kJitter = std::chrono::microseconds(100);
+  int sets = 0;
+  for (int tick = 0; tick < 400; ++tick) {
+    const Stamp now = ms(5 * tick) + (1 - tick % 3) * kJitter;
+    if (!sender.due(false, now)) continue;
+    EXPECT_EQ(tick % 4, 0);
+    ++sets;
+    EXPECT_TRUE(sender.send({}, {}, {}, *bus, now));
+  }
+  EXPECT_EQ(sets, 100);
+}
 
 TEST(CommandSender, MakesUpForNothingAfterAGap) {
   can::MemoryBusHub hub;

@@ -154,6 +154,18 @@ TEST_P(SocketCanBridge, ABusThatGoesOffAgainAndAgainIsNotHurried) {
   EXPECT_GE(kernel.cycles, 10) << "but never given up";
 }
 
+TEST_P(SocketCanBridge, AStallOfABusThatHasJustWorkedAgainIsFlushedAtOnce) {
+  rig.drive();
+  kernel.stall();
+  expectStop();
+  const std::uint64_t confirmed = rig.bridge_bus->confirmed();
+  rig.run(0.25, [&] { return rig.bridge_bus->confirmed() > confirmed; });
+  ASSERT_EQ(kernel.cycles, 1);
+  kernel.stall();
+  rig.run(0.06, [&] { return kernel.cycles == 2; });
+  EXPECT_EQ(kernel.cycles, 2) << "its frames would wait for as long as the helper is not asked";
+}
+
 TEST_P(SocketCanBridge, ATimeoutOfTheTransmitterWithNothingInFlightStopsAndIsCycled) {
   rig.drive();
   rig.run(0.1, [&] { return rig.bridge_bus->inFlight() == 0; });

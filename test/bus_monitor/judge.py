@@ -141,6 +141,7 @@ class Judge:
             self.streams[identifier].restart()
         self.last = None  # TP_COMMAND
         self.pending = []  # steering commands whose state was not told
+        self.cut = None  # the command whose set the bus broke within
         self.state = None
         self.state_time = self.source_time = time
         self.sequence = -1
@@ -204,6 +205,8 @@ class Judge:
             self.streams[identifier].restart()
         self.source_time = self.state_time = time
         self.bus_broke = True
+        if state == 'down':
+            self.cut = self.last
         if self.network:
             self.network.bus(time, state == 'up')
 
@@ -418,9 +421,13 @@ class Judge:
     def _status(self, time, data, text):
         state, before = data >> 12 & 0xF, self.state
         self.state, self.state_time = state, time
+        # Before this state, which may end the operator's edge.
+        could_steer = before is not None and self._may_steer(before)
+        could_begin = before == ARMED and self.edge is not None
         self._follow_edges(time, state, before)
         for command in self.pending:  # its own state was lost: one of its neighbours' must allow it
-            if not self._may_steer(state) and not (before is not None and self._may_steer(before)):
+            allowed = self._may_steer(state) or could_steer or could_begin and command is self.cut
+            if not allowed:
                 self._find(command.time, 'c', 'steers', f'in {self.states[state]}', command.frame)
         self.pending = []
         command = self.last

@@ -228,8 +228,38 @@ def stop_without_driving(drive):
     drive.drive()
 
 
+def _loses_what_a_command_was_sent_in(drive, state):
+    first = len(drive.items)
+    drive.cycle(state)
+    drive.items[first:] = [item for item in drive.items[first:]
+                           if not (item[0] == 'frame' and item[2] in ('TP_COMMAND_INFO', 'TP_STATUS'))]
+
+
+def hangs_after_its_command(drive):
+    """What told the command's state does not come any more; the next state on the bus is that of a pilot that stopped."""
+    _loses_what_a_command_was_sent_in(drive, ACTIVE)
+    drive.run(STOPPED, 30, stop=True)
+    drive.reset()
+    drive.engage()
+    drive.drive()
+
+
+def hangs_after_its_first_command(drive):
+    """The same with the first that steers: neither neighbour may, but the bus broke, and the one before was ARMED."""
+    drive.stop()
+    drive.reset()
+    drive.engage()
+    _loses_what_a_command_was_sent_in(drive, ACTIVE)
+    drive.event('bus', 'down')
+    drive.event('bus', 'up')
+    drive.claim()
+    drive.time += 250 * MS
+    drive.run(STOPPED, 30, stop=True)
+
+
 GOOD = [plain, lost_single_frames, repeated_commands, stop_and_go_again, stop_at_its_limit, override,
-        feedback_at_its_limit, full_rate, degraded, stop_without_driving]
+        feedback_at_its_limit, full_rate, degraded, stop_without_driving, hangs_after_its_command,
+        hangs_after_its_first_command]
 
 
 # ---- bad ones: (name, expected finding, what is done to a drive that has started)
@@ -336,7 +366,7 @@ def winds_up_at_speed(drive):
 def speeds_up_in_a_bend(drive):
     """Holds an angle and goes on accelerating past 2.0 m/s^2."""
     drive.wanted, drive.repeat = 1.5, True
-    for _ in range(100):
+    while drive.angle < 25.0:  # wherever it began
         drive.angle += 0.29
         drive.cycle(ACTIVE)
     drive.wanted = drive.random.uniform(5.5, 8.0)
@@ -367,6 +397,14 @@ def steers_before_it_may(drive):
         drive.event('engage')
     drive.cycle(state, stop=state == STOPPED)
     _last(drive, 'TP_COMMAND')[3]['SteeringEnable'] = 1
+
+
+def steers_while_armed_and_hides_it(drive):
+    drive.stop()
+    drive.reset()
+    drive.engage()
+    _loses_what_a_command_was_sent_in(drive, ACTIVE)
+    drive.run(STOPPED, 30, stop=True)
 
 
 def drives_without_an_edge(drive):
@@ -475,6 +513,7 @@ BAD = [(wrong_length, 'a length'), (remote_frame, 'a length'), (wrong_crc, 'a cr
        (angle_leaps, 'b rate'), (begins_off_the_measured_angle, 'b rate'),
        (winds_up_at_speed, 'b lateral acceleration'), (speeds_up_in_a_bend, 'b lateral acceleration'),
        (too_many_frames, 'b period'), (steers_before_it_may, 'c steers'),
+       (steers_while_armed_and_hides_it, 'c steers'),
        (drives_without_an_edge, 'c no re-arm edge'), (drives_on_after_a_stop, 'c no re-arm edge'),
        (steers_on_old_feedback, 'c steers on old feedback'), (steers_on_corrupt_feedback, 'c steers on old feedback'),
        (steers_on_an_old_measurement, 'c old measurement'), (lies_about_its_measurement, 'c old measurement'),

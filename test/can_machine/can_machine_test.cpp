@@ -17,12 +17,6 @@ namespace {
 
 using can::BusState;
 
-constexpr double kStopLimit = 0.060;      // [s] from the fault
-constexpr double kRecoveryLimit = 0.250;  // [s] from the bus's return to a confirmed frame
-constexpr double kOutageLimit = 0.500;  // [s] from a fault to a confirmed frame, where the helper helps
-constexpr double kAgeLimit = 0.060;     // [s] of what a frame tells, when it comes
-constexpr double kLongestAct = 0.001;   // [s] that a fault may come later than it was asked for
-
 /// Worst figures of one kind of fault: a line of the table.
 struct Row {
   int count = 0;

@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <cstring>
 #include <fstream>
-#include <optional>
 #include <stdexcept>
 
 #include "rig.h"
@@ -25,6 +24,22 @@ constexpr int kReceiveBuffer = 1 << 24;         // [byte]
 
 Stamp wallTime() { return Stamp(std::chrono::system_clock::now().time_since_epoch()); }
 
+long counter(const std::string& interface, const std::string& name) {
+  long count = 0;
+  std::ifstream file("/sys/class/net/" + interface + "/statistics/" + name);
+  if (!(file >> count)) throw std::runtime_error("cannot read " + name + " of " + interface);
+  return count;
+}
+
+long heard() { return counter(kInterface, "rx_packets"); }
+long sent() { return counter("can0", "tx_packets") + counter("can1", "tx_packets"); }
+
+/// Frames that the controller had no room for (each stands for some), or the kernel.
+long lost() {
+  return counter(kInterface, "rx_over_errors") + counter(kInterface, "rx_errors") +
+         counter(kInterface, "rx_dropped") + counter(kInterface, "rx_missed_errors");
+}
+
 int openSocket() {
   const int number = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW);
   const int on = 1;
@@ -34,6 +49,7 @@ int openSocket() {
   address.can_ifindex = static_cast<int>(if_nametoindex(kInterface));
   const bool good =
       address.can_ifindex != 0 && setsockopt(number, SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof(on)) == 0 &&
+      setsockopt(number, SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof(on)) == 0 &&
       setsockopt(number, SOL_SOCKET, SO_RCVBUFFORCE, &kReceiveBuffer, sizeof(kReceiveBuffer)) == 0 &&
       setsockopt(number, SOL_SOCKET, SO_RCVTIMEO, &wait, sizeof(wait)) == 0 &&
       bind(number, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
@@ -41,20 +57,26 @@ int openSocket() {
   return number;
 }
 
-std::optional<Stamp> stampOf(msghdr& header) {
+/// What the kernel tells beside a frame; false when it does not.
+template <class Value>
+bool take(msghdr& header, int type, Value& value) {
   for (cmsghdr* part = CMSG_FIRSTHDR(&header); part != nullptr; part = CMSG_NXTHDR(&header, part)) {
-    if (part->cmsg_level != SOL_SOCKET || part->cmsg_type != SCM_TIMESTAMPNS) continue;
-    timespec stamp{};
-    std::memcpy(&stamp, CMSG_DATA(part), sizeof(stamp));
-    return std::chrono::seconds(stamp.tv_sec) + std::chrono::nanoseconds(stamp.tv_nsec);
+    if (part->cmsg_level != SOL_SOCKET || part->cmsg_type != type) continue;
+    std::memcpy(&value, CMSG_DATA(part), sizeof(value));
+    return true;
   }
-  return std::nullopt;
+  return false;
 }
 
 }  // namespace
 
 Recorder::Recorder()
-    : socket_(openSocket()), offset_(wallTime() - steadyTime()), thread_([this] { run(); }) {}
+    : socket_(openSocket()),
+      heard_before_(heard()),
+      lost_before_(lost()),
+      sent_before_(sent()),
+      offset_(wallTime() - steadyTime()),
+      thread_([this] { run(); }) {}
 
 Recorder::~Recorder() {
   ends_ = true;
@@ -63,21 +85,28 @@ Recorder::~Recorder() {
 }
 
 void Recorder::run() {
-  while (!ends_) {
+  for (;;) {
+    const bool last = ends_;  // then what waits is read, and no more
     can_frame in{};
-    alignas(cmsghdr) char control[64];
+    alignas(cmsghdr) char control[128];
     iovec bytes{&in, sizeof(in)};
     msghdr header{};
     header.msg_iov = &bytes;
     header.msg_iovlen = 1;
     header.msg_control = control;
     header.msg_controllen = sizeof(control);
-    if (recvmsg(socket_, &header, 0) != sizeof(in)) continue;
+    if (recvmsg(socket_, &header, last ? MSG_DONTWAIT : 0) != sizeof(in)) {
+      if (last) return;
+      continue;
+    }
+    ++heard_;
+    take(header, SO_RXQ_OVFL, unread_);
+    timespec at{};
     const auto frame = can::fromLinux(in);
-    const auto stamp = stampOf(header);
-    if (!frame || !stamp) continue;
+    if (!frame || !take(header, SCM_TIMESTAMPNS, at)) continue;
+    const Stamp stamp = std::chrono::seconds(at.tv_sec) + std::chrono::nanoseconds(at.tv_nsec);
     const std::lock_guard<std::mutex> lock(mutex_);
-    frames_.emplace_back(*stamp - offset_, *frame);
+    frames_.emplace_back(stamp - offset_, *frame);
   }
 }
 
@@ -94,14 +123,24 @@ std::vector<std::pair<Stamp, can::Frame>> Recorder::since(Stamp begin) const {
   return found;
 }
 
-void Recorder::handOver(const std::string& name, const std::string& profile) {
+// A controller that hangs does not count what it sent, hence no equality.
+std::string Recorder::end() {
   ends_ = true;
   thread_.join();
+  if (lost() != lost_before_) return "overrun";
+  if (unread_ != 0) return "unread";
+  if (heard() - heard_before_ != heard_) return "uncounted";
+  if (heard() - heard_before_ < sent() - sent_before_) return "unheard";
+  return "nothing";
+}
+
+void Recorder::handOver(const std::string& name, const std::string& profile) {
+  const std::string missing = end();
   const auto earlier = [](const auto& a, const auto& b) { return a.first < b.first; };
   std::stable_sort(events_.begin(), events_.end(), earlier);
   std::stable_sort(frames_.begin(), frames_.end(), earlier);
   std::fstream out(kPort, std::ios::in | std::ios::out);  // which creates no file
-  out << "# " << name << " " << profile << "\n";
+  out << "# " << name << " " << profile << " " << missing << "\n";
   can::LogWriter log(out);
   auto event = events_.begin();
   for (const auto& [stamp, frame] : frames_) {

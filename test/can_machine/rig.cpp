@@ -58,6 +58,14 @@ std::vector<can::Identifier> allIdentifiers() {
   return can::identifiersOf(profileOf(can::Side::kPilot, can::ProfileKind::kPlain));
 }
 
+std::int64_t ageOf(const can::Frame& frame, Stamp now) {
+  const auto info = can::decode<can::CommandInfoFrame>(frame);
+  if (!info) return 0;
+  const auto now_ms = std::chrono::duration_cast<milliseconds>(now).count();
+  const std::int64_t age = static_cast<std::uint16_t>(now_ms - info->measurement_stamp_ms);
+  return age < 60000 ? age : 0;  // beyond: rounded from the future
+}
+
 // -------- Truck
 
 Truck::Truck(can::ProfileKind kind) : kind_(kind), thread_([this] { run(); }) {}
@@ -88,17 +96,14 @@ void Truck::run() {
 }
 
 void Truck::judge(const can::Frame& frame, Stamp now) {
-  const auto info = can::decode<can::CommandInfoFrame>(frame);
-  if (!info) return;
-  const auto now_ms = std::chrono::duration_cast<milliseconds>(now).count();
-  const std::int64_t age = static_cast<std::uint16_t>(now_ms - info->measurement_stamp_ms);
-  if (age > worst_age_ms_ && age < 60000) worst_age_ms_ = age;  // beyond: rounded from the future
+  worst_age_ms_ = std::max<std::int64_t>(worst_age_ms_, ageOf(frame, now));
 }
 
 // -------- Injection
 
-Injection::Injection(const std::function<void()>& act)
-    : thread_([this, act] {
+Injection::Injection(const std::function<void()>& act, double delay)
+    : thread_([this, act, delay] {
+        sleepUntil(steadyTime() + fromSeconds(delay));
         begin_ = steadyTime().count();
         act();
         end_ = steadyTime().count();
@@ -161,8 +166,11 @@ bool Pilot::drive() {
   while (steadyTime() < end && state() != SafetyState::kActive) {
     sleepUntil(next_tick_);  // by then the frames of the tick before are out
     const Stamp now = steadyTime();
-    if (state() == SafetyState::kStopped && bridge->reset(now).accepted) event("reset", now);
-    if (state() == SafetyState::kStandby && bridge->engage(now).accepted) {
+    // Engaged a tick after the reset, which may send a set of its own: that would be on the bus after
+    // the engage, and tells of STANDBY.
+    if (state() == SafetyState::kStopped) {
+      if (bridge->reset(now).accepted) event("reset", now);
+    } else if (state() == SafetyState::kStandby && bridge->engage(now).accepted) {
       engaged_by_us = true;
       event("engage", now);
     }

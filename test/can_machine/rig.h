@@ -16,10 +16,21 @@ namespace tunnel_pilot::bridge {
 
 Stamp steadyTime();
 
+// -------- what is asked for at a fault
+
+constexpr double kStopLimit = 0.060;      // [s] from the fault
+constexpr double kRecoveryLimit = 0.250;  // [s] from the bus's return to a confirmed frame
+constexpr double kOutageLimit = 0.500;  // [s] from a fault to a confirmed frame, where the helper helps
+constexpr double kAgeLimit = 0.060;     // [s] of what a frame tells, when it comes
+constexpr double kLongestAct = 0.001;   // [s] that a fault may come later than it was asked for
+
 /// Who the two sides are on a bus of this kind, by the shipped files.
 can::Profile profileOf(can::Side side, can::ProfileKind kind);
 
 std::vector<can::Identifier> allIdentifiers();  ///< of the plain profile
+
+/// Of the measurement that a frame of the bridge tells of [ms]; 0 for other frames.
+std::int64_t ageOf(const can::Frame& frame, Stamp now);
 
 /// A truck's controller with a truck that stands, on can1, in a thread of its own, that also judges what
 /// it hears of the bridge.
@@ -44,7 +55,8 @@ class Truck {
 /// Something done to the bus, in a thread of its own: the bridge is not held up by it.
 class Injection {
  public:
-  explicit Injection(const std::function<void()>& act);
+  /// `delay`: before it [s].
+  explicit Injection(const std::function<void()>& act, double delay = 0.0);
   ~Injection() { thread_.join(); }
   Stamp begin() const { return Stamp(begin_.load()); }
   Stamp end() const { return Stamp(end_.load()); }

@@ -47,7 +47,7 @@ const StageCase kStages[] = {
     {"centerline", start<CenterlineRos>},    {"preview_driver", start<PreviewDriverRos>},
     {"lidar_driver", start<LidarDriverRos>}, {"arbiter", start<ArbiterRos>},
     {"can_bridge", start<CanBridgeRos>},     {"simulator", start<SimulatorRos>},
-    {"lap_monitor", start<LapMonitor>},
+    {"lap_monitor", start<LapMonitor>},      {"markers", start<MarkersRos>},
 };
 
 // The way to one value in a tree: keys and indices.
@@ -252,11 +252,6 @@ TEST(BadParameters, SimulatedTimeIsRefusedOnAnInterface) {
   }
 }
 
-TEST(BadParameters, MarkersTakeNone) {
-  ros::NodeHandle("spoilt_markers").setParam("size", 1);
-  EXPECT_THROW(start<MarkersRos>(ros::NodeHandle("spoilt_markers")), config::ConfigError);
-}
-
 class NodeTest : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(NodeTest, WithoutParametersEndsWithAnErrorStatusAndSaysWhy) {
@@ -275,8 +270,8 @@ TEST_P(NodeTest, WithoutParametersEndsWithAnErrorStatusAndSaysWhy) {
 
 INSTANTIATE_TEST_SUITE_P(Nodes, NodeTest,
                          ::testing::Values("arbiter", "can_bridge", "centerline", "lap_monitor",
-                                           "lidar_driver", "preview_driver", "scan_filter", "simulator",
-                                           "wall_segmentation"));
+                                           "lidar_driver", "markers", "preview_driver", "scan_filter",
+                                           "simulator", "wall_segmentation"));
 
 }  // namespace
 }  // namespace tunnel_pilot::shell

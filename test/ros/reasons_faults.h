@@ -165,8 +165,9 @@ enum class Part {
   kLidarDriver,              ///< the real preview driver's proposals under the lidar driver's name
   kUnsureLidarDriver,        ///< ... with little confidence
   kOtherLidarDriver,         ///< ... elsewhere
+  kBothDrivers,              ///< as kPreviewDriver, and the same under the lidar driver's name
+  kUnableDrivers,            ///< ... not valid
   kPreviewDriver,            ///< along the middle of the tunnel
-  kUnablePreviewDriver,      ///< not valid
   kImpossiblePreviewDriver,  ///< not a number
   kWildPreviewDriver,        ///< wider than the hinge turns
 };
@@ -197,15 +198,15 @@ class Understudy : private BesideTheTest {
     const Part part = part_;
     if (part == Part::kUnsureLidarDriver) proposal.confidence = 0.1;
     if (part == Part::kOtherLidarDriver) proposal.articulation_angle += 0.2;
-    if (part >= Part::kLidarDriver && part <= Part::kOtherLidarDriver) lidar_driver_.publish(proposal);
+    if (part >= Part::kLidarDriver && part <= Part::kUnableDrivers) lidar_driver_.publish(proposal);
   }
 
   void playPreviewDriver(const TunnelState& tunnel) {
     const Part part = part_;
-    if (part < Part::kPreviewDriver) return;
+    if (part < Part::kBothDrivers) return;
     Proposal proposal;
     proposal.header = tunnel.header;
-    proposal.valid = tunnel.valid && part != Part::kUnablePreviewDriver;
+    proposal.valid = tunnel.valid && part != Part::kUnableDrivers;
     proposal.articulation_angle = -0.2 * tunnel.lateral_offset - 1.2 * tunnel.heading_error;
     proposal.speed = 1.5;
     proposal.confidence = 1.0;

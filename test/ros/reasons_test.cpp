@@ -1,7 +1,6 @@
-// Each reason why the truck does what it does, but for the reserved one and those that are DISABLED_
-// (not yet seen to pass), is provoked while it drives, and is told within a second of ROS time, in the
-// same words, on the HUD, in the line of `status`, on /diagnostics and in the log of the node that found
-// it. How soon is printed at the end.
+// Each reason why the truck does what it does, but for the reserved one, is provoked while it drives,
+// and is told within a second of ROS time, in the same words, on the HUD, in the line of `status`, on
+// /diagnostics and in the log of the node that found it. How soon is printed at the end.
 #include <dynamic_reconfigure/Reconfigure.h>
 #include <gtest/gtest.h>
 #include <nodelet/NodeletLoad.h>
@@ -394,8 +393,8 @@ TEST_F(Reasons, TheDriversProposalIsTooOld) {
                                     [] { loadUnlessLoaded("preview_driver"); }});
 }
 
-TEST_F(Reasons, DISABLED_NoHealthyDriver) {
-  expectToldOfPart(Reason::kNoSource, Part::kPreviewDriver, Part::kUnablePreviewDriver);
+TEST_F(Reasons, NoHealthyDriver) {
+  expectToldOfPart(Reason::kNoSource, Part::kBothDrivers, Part::kUnableDrivers);
 }
 
 TEST_F(Reasons, TheDriversProposalIsNotAPossibleCommand) {

@@ -16,6 +16,7 @@
 #include "tunnel_pilot/ros/sensor_pose.h"
 #include "tunnel_pilot/ros/status_line.h"
 #include "tunnel_pilot/ros/status_text.h"
+#include "tunnel_pilot/ros/stopping_markers.h"
 
 namespace tunnel_pilot::shell {
 namespace {
@@ -317,6 +318,95 @@ TEST(BusTap, CountsBeforeFramesAreReadAndLosesNone) {
   EXPECT_EQ(0x110u, tap.receive()->id);
   EXPECT_EQ(0x111u, tap.receive()->id);
   EXPECT_FALSE(tap.receive().has_value());
+}
+
+constexpr double kNose = 1.6;  // [m]
+
+// A corridor 3 m wide, straight for 10 m behind the front axle and ahead of it, or in a left-hand bend
+// of 20 m ahead of it; `free` and `stopping` metres from the nose.
+ArbiterState stoppingState(double free, double stopping, bool bend = false) {
+  ArbiterState state;
+  state.header.stamp = ros::Time(7.0);
+  state.free_distance = free;
+  state.stopping_distance = stopping;
+  for (double s = -10.0; s < 30.5; s += 1.0) {
+    const double turned = bend && s > 0.0 ? s / 20.0 : 0.0;
+    for (const double left : {1.5, -1.5}) {
+      geometry_msgs::Point32 point;
+      point.x = static_cast<float>(turned > 0.0 ? (20.0 - left) * std::sin(turned) : s);
+      point.y = static_cast<float>(turned > 0.0 ? 20.0 - (20.0 - left) * std::cos(turned) : left);
+      (left > 0.0 ? state.corridor_left : state.corridor_right).push_back(point);
+    }
+  }
+  return state;
+}
+
+struct Reach {
+  double from, to, width;  // along x, along y [m]
+};
+
+Reach reachOf(const visualization_msgs::Marker& m) {
+  Reach reach{1e9, -1e9, 0.0};
+  for (const auto& point : m.points) {
+    reach.from = std::min(reach.from, point.x);
+    reach.to = std::max(reach.to, point.x);
+    reach.width = std::max(reach.width, 2.0 * std::abs(point.y));
+  }
+  return reach;
+}
+
+TEST(StoppingMarkers, ReachFromTheNoseAsFarAsTheArbiterSays) {
+  const auto markers = stoppingMarkers(stoppingState(12.25, 5.5), kNose);
+  ASSERT_EQ(2u, markers.size());
+  EXPECT_EQ("free_distance", markers[0].ns);
+  EXPECT_EQ("stopping_distance", markers[1].ns);
+  for (const auto& m : markers) {
+    EXPECT_EQ(visualization_msgs::Marker::ADD, m.action);
+    EXPECT_EQ("base_link", m.header.frame_id);
+    EXPECT_EQ(ros::Time(7.0), m.header.stamp);
+    EXPECT_EQ(m.points.size(), m.colors.size());
+    EXPECT_NEAR(kNose, reachOf(m).from, 1e-5);
+    EXPECT_NEAR(3.0, reachOf(m).width, 1e-5);  // the gate's
+  }
+  EXPECT_NEAR(kNose + 12.25, reachOf(markers[0]).to, 1e-5);
+  EXPECT_NEAR(kNose + 5.5, reachOf(markers[1]).to, 1e-5);
+}
+
+TEST(StoppingMarkers, FollowTheCorridorsBend) {
+  const auto markers = stoppingMarkers(stoppingState(15.0, 5.0, true), kNose);
+  const double turned = (kNose + 15.0) / 20.0;
+  // The last quad is the gate: its middle is where the free way ends.
+  const auto& points = markers[0].points;
+  ASSERT_GE(points.size(), 6u);
+  const auto& left = points[points.size() - 6];
+  const auto& right = points[points.size() - 5];
+  EXPECT_NEAR(20.0 * std::sin(turned), 0.5 * (left.x + right.x), 0.1);
+  EXPECT_NEAR(20.0 * (1.0 - std::cos(turned)), 0.5 * (left.y + right.y), 0.1);
+}
+
+TEST(StoppingMarkers, TellTheMarginByTheirColour) {
+  const auto colorAt = [](double margin) {
+    return stoppingMarkers(stoppingState(5.0 + margin, 5.0), kNose)[1].color;
+  };
+  EXPECT_EQ(1.0F, colorAt(0.5).r);  // red
+  EXPECT_EQ(0.0F, colorAt(0.5).g);
+  EXPECT_EQ(0.0F, colorAt(-4.0).g);
+  EXPECT_NEAR(1.0F, colorAt(2.0).r, 1e-5);  // yellow
+  EXPECT_NEAR(1.0F, colorAt(2.0).g, 1e-5);
+  EXPECT_EQ(0.0F, colorAt(3.5).r);  // green
+  EXPECT_EQ(1.0F, colorAt(9.0).g);
+}
+
+TEST(StoppingMarkers, EndWithTheCorridorAndAreRemovedWhereNothingIsKnown) {
+  EXPECT_NEAR(30.0, reachOf(stoppingMarkers(stoppingState(80.0, 5.0), kNose)[0]).to, 1e-5);
+  ArbiterState nowhere = stoppingState(5.0, 5.0);
+  nowhere.corridor_left.clear();
+  for (const ArbiterState& state : {stoppingState(0.0, 0.0), stoppingState(kNan, kNan), nowhere}) {
+    for (const auto& m : stoppingMarkers(state, kNose)) {
+      EXPECT_EQ(visualization_msgs::Marker::DELETE, m.action) << m.ns;
+      EXPECT_TRUE(m.points.empty());
+    }
+  }
 }
 
 bool tells(const StatusText& status, const std::string& words) {

@@ -12,6 +12,7 @@
 #include <tunnel_pilot/TruckStatus.h>
 #include <tunnel_pilot/TunnelState.h>
 #include <tunnel_pilot/Walls.h>
+#include <visualization_msgs/MarkerArray.h>
 
 #include "../drivers/random_network.h"
 #include "../neural/small_network.h"
@@ -728,6 +729,45 @@ TEST_F(LiveTuningTest, EveryAnswerIsToldToAllClients) {
   ASSERT_TRUE(spinUntil([&] { return !heard.empty(); }));
   maxSpeedAfter(6.0);
   EXPECT_TRUE(spinUntil([&] { return valueIn(heard.back(), "governor.max_speed") == 6.0; }));
+}
+
+// Farthest point ahead of the marker of this name in the messages so far [m]; NaN without it.
+double reachOf(const std::vector<visualization_msgs::MarkerArray>& messages, const std::string& ns) {
+  double farthest = std::numeric_limits<double>::quiet_NaN();
+  for (const auto& message : messages) {
+    for (const auto& m : message.markers) {
+      if (m.ns != ns) continue;
+      for (const auto& point : m.points) farthest = std::fmax(farthest, point.x);
+    }
+  }
+  return farthest;
+}
+
+TEST_F(StageTest, MarkersShowTheStoppingDistanceFromTheTrucksNose) {
+  constexpr double kNose = 1.6;  // of the truck file [m]
+  const ros::Publisher states = nh_.advertise<ArbiterState>("arbiter_state", 10);
+  std::vector<visualization_msgs::MarkerArray> heard;
+  const ros::Subscriber subscriber = nh_.subscribe<visualization_msgs::MarkerArray>(
+      "markers", 10, [&heard](const auto& m) { heard.push_back(*m); });
+  ASSERT_TRUE(load("markers", "markers"));
+  ASSERT_TRUE(
+      spinUntil([&] { return states.getNumSubscribers() > 0 && subscriber.getNumPublishers() > 0; }));
+  ArbiterState state;
+  state.header.stamp = ros::Time(1000.0);
+  state.free_distance = 20.0;
+  state.stopping_distance = 6.0;
+  for (int x = -7; x < 31; ++x) {
+    geometry_msgs::Point32 edge;
+    edge.x = static_cast<float>(x);
+    edge.y = 1.5F;
+    state.corridor_left.push_back(edge);
+    edge.y = -1.5F;
+    state.corridor_right.push_back(edge);
+  }
+  send(states, state);
+  EXPECT_TRUE(spinUntil([&] { return reachOf(heard, "stopping_distance") > 0.0; }));
+  EXPECT_NEAR(kNose + 6.0, reachOf(heard, "stopping_distance"), 1e-5);
+  EXPECT_NEAR(kNose + 20.0, reachOf(heard, "free_distance"), 1e-5);
 }
 
 }  // namespace

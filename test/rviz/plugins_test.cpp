@@ -169,6 +169,20 @@ TEST_F(PanelTest, KeepsFolderAndTopicsInTheConfiguration) {
   EXPECT_EQ("scan my_topic", topics.toStdString());
 }
 
+TEST_F(PanelTest, RecordsWhatRecordLaunchRecords) {
+  QProcess launch;
+  launch.start("roslaunch",
+               {"--args", "/recorder", "tunnel_pilot", "record.launch", "folder:=/nowhere"});
+  ASSERT_TRUE(launch.waitForFinished());
+  const QString command = QString(launch.readAllStandardOutput()).simplified();
+  rviz::Config saved;
+  panel_.save(saved);
+  QString topics;
+  ASSERT_TRUE(saved.mapGetString("Record Topics", &topics));
+  EXPECT_TRUE(topics.startsWith("scan ")) << topics.toStdString();
+  EXPECT_TRUE(command.contains("/nowhere/drive " + topics)) << command.toStdString();
+}
+
 class RecorderTest : public PanelTest {
  protected:
   RecorderTest() : scans_(node_.advertise<sensor_msgs::LaserScan>("scan", 10)) {

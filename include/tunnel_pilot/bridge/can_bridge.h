@@ -153,8 +153,9 @@ class CanBridge {
   std::optional<std::string> silent_process_;
   std::uint32_t sequence_offset_ = 0;  ///< added to the arbiter's numbers, so that they never decrease
   Stamp last_tick_{};
-  Stamp entered_{};  ///< the present state
-  std::optional<Stamp> asked_to_discard_;
+  Stamp entered_{};                        ///< the present state
+  std::optional<Stamp> asked_to_discard_;  ///< since the bus last worked
+  std::uint64_t confirmed_in_fault_ = 0;   ///< frames, when the bus last failed
   std::optional<Stamp> link_healthy_since_;
   std::optional<Stamp> healthy_since_;  ///< all inputs
   std::optional<Stamp> undegraded_since_;

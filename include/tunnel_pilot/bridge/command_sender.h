@@ -15,6 +15,8 @@ class CommandSender {
  public:
   static constexpr std::size_t kMaxFrames = 16;
   static constexpr Stamp kWindow = std::chrono::milliseconds(250);
+  /// By which a tick may come before the period is over and still be the one: the next would be late.
+  static constexpr Stamp kEarly = std::chrono::microseconds(500);
 
   /// `period` [s]
   explicit CommandSender(double period);

@@ -11,11 +11,12 @@ namespace tunnel_pilot::bridge {
 /// Knows how long the frames that the bus has taken have been waiting for the proof that they were sent.
 /// Frames are sent in sets, at most kMaxSets of which may be on their way: a third is not written, so
 /// that whatever happens to the bus, no more than these can come late. With frames every 20 ms, a ceased
-/// transmission is found at most 60 ms after it ceased, by ticks of 20 ms and faster.
+/// transmission is found at most 60 ms after it ceased, by ticks of 20 ms and faster. The limit is no
+/// multiple of a tick: one that comes a little early would miss it, and find it a tick later.
 class TransmitWatch {
  public:
   static constexpr std::size_t kMaxSets = 2;
-  static constexpr Stamp kMaxAge = std::chrono::milliseconds(35);
+  static constexpr Stamp kMaxAge = std::chrono::microseconds(34500);
 
   /// A set of frames was given to the bus at `now`, which took `frames` of them.
   void sent(std::uint64_t frames, Stamp now);

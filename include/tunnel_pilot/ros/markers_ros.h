@@ -19,12 +19,13 @@ namespace tunnel_pilot::shell {
 /// `tunnel_state`, `arbiter_state`, `command`, `preview_driver/proposal`, `lidar_driver/proposal`,
 /// `truck_status`, `odom`; publishes `markers` (visualization_msgs/MarkerArray) with namespaces
 /// wall_left, wall_right (returns, curves and the faces that stand on them), preview_point, corridor
-/// (swept by both bodies, green where far from the walls, red where near), network (each output a bar
+/// (swept by both bodies, green where far from the walls, red where near), free_distance and
+/// stopping_distance (stopping_markers.h), network (each output a bar
 /// before the truck, in the direction of its articulation and as long as it is probable, and the decoded
 /// one as an arrow), driven_path (in odom, since the pilot was last engaged, the odometry jumped or the
 /// clock went back) and status (in words: status_text.h). Sizes follow the tunnel's width, so that a
-/// robot's corridor looks like a truck's drift. Costs little while nobody looks. No parameters. Throws
-/// config::ConfigError for any that is given.
+/// robot's corridor looks like a truck's drift. Costs little while nobody looks. Parameter: `truck_file`
+/// (path of the truck's YAML). Throws config::ConfigError.
 class MarkersRos {
  public:
   MarkersRos(ros::NodeHandle nh, ros::NodeHandle private_nh);
@@ -49,6 +50,7 @@ class MarkersRos {
   Latest<nav_msgs::Odometry> odometry_;
   Latest<Proposal> network_;
   double scale_ = 0.5;      // of what is drawn: the tunnel's width over a drift's, slowly followed
+  double front_overhang_;   // of the truck's nose before its front axle [m]
   bool is_scaled_ = false;  // a width was seen
   ros::SteadyTime corridor_drawn_;
   visualization_msgs::Marker driven_path_;
