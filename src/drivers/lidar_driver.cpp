@@ -57,7 +57,6 @@ LidarDriverParameters loadLidarDriver(config::Node node, const std::string& fold
   p.mirror = node.boolean("mirror");
   p.sure = node.number("sure", "1", 0.0, 1.0);
   p.bridge_time = node.number("bridge_time", "s", 0.0, 0.5);
-  p.small_lead_share = node.number("small_lead_share", "1", 0.1, 1.0);
   p.steering = loadSteeringEstimator(node);
   node.finish();
   return p;
@@ -208,7 +207,7 @@ std::optional<LidarDriver::Answer> LidarDriver::decode() const {
 // whose steering is slower or later than believed. Great ones are up to the steering's fastest rate.
 double LidarDriver::softened(double lead) const {
   const double used = std::min(1.0, std::abs(lead) / parameters_.steering.lead);
-  return lead * (parameters_.small_lead_share + (1.0 - parameters_.small_lead_share) * used);
+  return lead * (output_.small_lead_share + (1.0 - output_.small_lead_share) * used);
 }
 
 LidarDriver::Answer LidarDriver::bridged(const Answer& answer, Stamp stamp) {

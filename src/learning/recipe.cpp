@@ -40,6 +40,7 @@ NetworkDesign loadDesign(config::Node node) {
                       : activation == "tanh"  ? neural::Activation::kTanh
                                               : neural::Activation::kRelu;
   design.gaussian = node.choice("output", {"gaussian", "value"}) == "gaussian";
+  design.small_lead_share = node.number("small_lead_share", "1", 0.1, 1.0);
   node.finish();
   return design;
 }
@@ -158,6 +159,7 @@ neural::NetworkFile makeNetwork(const NetworkDesign& design, const std::string& 
   neural::OutputGroup output;
   output.meaning = "articulation_angle";
   output.unit = "rad";
+  output.small_lead_share = design.small_lead_share;
   if (design.gaussian) {
     output.code = neural::OutputGroup::Code::kGaussian;
     output.first = -M_PI / 4.0;

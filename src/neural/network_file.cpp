@@ -187,6 +187,9 @@ OutputGroup readOutput(Node node, const Network& network) {
       node.refuse("code", std::string("does not suit the last layer: ") + e.what());
     }
   }
+  if (node.has("small_lead_share")) {
+    group.small_lead_share = node.number("small_lead_share", "1", 0.1, 1.0);
+  }
   node.finish();
   return group;
 }

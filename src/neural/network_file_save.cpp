@@ -60,11 +60,13 @@ std::string inputText(const InputGroup& group) {
 std::string outputText(const OutputGroup& group) {
   std::string text = "{meaning: " + quoted(group.meaning) + ", unit: " + quoted(group.unit);
   if (group.code == OutputGroup::Code::kValue) {
-    return text + ", code: value, offset: " + shortest(group.offset) +
-           ", scale: " + shortest(group.scale) + "}\n";
+    text += ", code: value, offset: " + shortest(group.offset) + ", scale: " + shortest(group.scale);
+  } else {
+    text += ", code: gaussian, first: " + shortest(group.first) +
+            ", spacing: " + shortest(group.spacing) + ", width: " + shortest(group.width);
   }
-  return text + ", code: gaussian, first: " + shortest(group.first) +
-         ", spacing: " + shortest(group.spacing) + ", width: " + shortest(group.width) + "}\n";
+  if (group.small_lead_share != 1.0) text += ", small_lead_share: " + shortest(group.small_lead_share);
+  return text + "}\n";
 }
 
 std::string trainingText(const std::string& training) {

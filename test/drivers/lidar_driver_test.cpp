@@ -128,8 +128,9 @@ TEST(LidarDriver, AScanWithoutAReturnOrOfAnotherSizeIsRefused) {
 
 // What a truck that stands straight is told to do when the network answers `answer` [rad], whatever it
 // sees.
-double commandFor(double answer) {
+double commandFor(double answer, double small_lead_share) {
   neural::NetworkFile network = randomNetwork();
+  network.output.small_lead_share = small_lead_share;
   std::vector<double>& p = network.network.parameters();
   std::fill(p.begin(), p.end(), 0.0);
   neural::GaussianCode(31, network.output.first, network.output.spacing, network.output.width)
@@ -144,11 +145,11 @@ double commandFor(double answer) {
 
 TEST(LidarDriver, OfASmallLeadOnlyAShareIsCommandedAndOfTheLargestAll) {
   const double most = parameters().steering.lead;
-  const double share = parameters().small_lead_share;
-  EXPECT_NEAR(commandFor(0.002), share * 0.002, 1e-4);
-  EXPECT_NEAR(commandFor(-0.5 * most), -0.5 * (share + 1.0) * 0.5 * most, 1e-4);
-  EXPECT_NEAR(commandFor(most), most, 1e-4);
-  EXPECT_NEAR(commandFor(0.2), most, 1e-9);
+  EXPECT_NEAR(commandFor(0.02, 1.0), 0.02, 1e-4);
+  EXPECT_NEAR(commandFor(0.002, 0.3), 0.3 * 0.002, 1e-4);
+  EXPECT_NEAR(commandFor(-0.5 * most, 0.3), -0.65 * 0.5 * most, 1e-4);
+  EXPECT_NEAR(commandFor(most, 0.3), most, 1e-4);
+  EXPECT_NEAR(commandFor(0.2, 0.3), most, 1e-9);
 }
 
 TEST(LidarDriver, ANetworkForOtherInputsOrOutputsIsRefused) {

@@ -60,7 +60,7 @@ DataSet madeUp(std::size_t count, std::uint64_t seed) {
 }
 
 NetworkDesign smallDesign(bool gaussian) {
-  return {true, NetworkDesign::Truck::kNone, {}, {6}, neural::Activation::kTanh, gaussian};
+  return {true, NetworkDesign::Truck::kNone, {}, {6}, neural::Activation::kTanh, gaussian, 1.0};
 }
 
 TrainingOptions quickTraining() {

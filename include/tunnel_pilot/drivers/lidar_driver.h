@@ -19,13 +19,12 @@ namespace tunnel_pilot::drivers {
 
 /// config/lidar_driver.yaml.
 struct LidarDriverParameters {
-  std::string network;      ///< file
-  double speed;             ///< highest speed asked for [m/s]
-  double max_scan_age;      ///< an older scan is not driven on [s]
-  bool mirror;              ///< also asks the network about the scan's mirror image, and averages
-  double sure;              ///< confidence below which a scan is bridged with the last sure answer [1]
-  double bridge_time;       ///< ... for so long [s]
-  double small_lead_share;  ///< of a small lead that is commanded [1]; of steering.lead, all of it is
+  std::string network;  ///< file
+  double speed;         ///< highest speed asked for [m/s]
+  double max_scan_age;  ///< an older scan is not driven on [s]
+  bool mirror;          ///< also asks the network about the scan's mirror image, and averages
+  double sure;          ///< confidence below which a scan is bridged with the last sure answer [1]
+  double bridge_time;   ///< ... for so long [s]
   SteeringEstimatorParameters steering;
 };
 

@@ -26,6 +26,7 @@ struct NetworkDesign {
   std::vector<std::size_t> hidden;        ///< dense layers
   neural::Activation activation;          ///< theirs
   bool gaussian;                          ///< 31 outputs of a Gaussian code; else the angle alone
+  double small_lead_share;                ///< neural::OutputGroup's [1]
 };
 
 /// Scenes of one world file (sampleScenes).

@@ -40,6 +40,9 @@ struct OutputGroup {
   double first = 0.0;    ///< Gaussian
   double spacing = 0.0;  ///< Gaussian
   double width = 0.0;    ///< Gaussian: c of exp(-(d / spacing)^2 / c) [1]
+  /// How much is meant of a value that leads the present one by little [1]: an answer learned from a
+  /// teacher that knows the truck is too sharp for one that does not. LidarDriver says how it is used.
+  double small_lead_share = 1.0;
 };
 
 /// Where the inputs lay in training: d^2 = |W (f - mean)|^2 of n features f of the inputs, W lower
