@@ -121,6 +121,8 @@ class LidarDriver {
   Refusal ask(Stamp now);
   std::optional<Answer> decode() const;
   Answer bridged(const Answer& answer, Stamp stamp);
+  /// Of the lead l before the articulation ahead what is commanded [rad]: l (s + (1 - s) min(1, |l|/L)),
+  /// s the network's small_lead_share, L SteeringEstimatorParameters::lead.
   double softened(double lead) const;
 
   LidarDriverParameters parameters_;
