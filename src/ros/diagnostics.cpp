@@ -5,7 +5,7 @@
 namespace tunnel_pilot::shell {
 namespace {
 
-constexpr double kPeriod = 0.5;  // [s] steady time
+constexpr double kPeriod = 0.25;  // [s] steady time
 
 }  // namespace
 

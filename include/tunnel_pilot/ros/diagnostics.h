@@ -8,9 +8,9 @@
 
 namespace tunnel_pilot::shell {
 
-/// Tells a stage's condition on /diagnostics twice a second of steady time: who listens only since then
-/// knows it within a second, and when simulated time stands still as well. The callback runs in the
-/// stage's own callback queue.
+/// Tells a stage's condition on /diagnostics four times a second of steady time: who has only begun to
+/// listen knows it within a second even if connecting takes a while, and when simulated time stands still
+/// as well. The callback runs in the stage's own callback queue.
 class Diagnostics {
  public:
   using Status = diagnostic_updater::DiagnosticStatusWrapper;
