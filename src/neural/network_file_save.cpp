@@ -124,7 +124,7 @@ std::string fileText(const NetworkFile& file) {
   return text + kHashKey + config::sha256(text) + "\n";
 }
 
-[[noreturn]] void refuse(const std::string& file, const std::string& why) {
+[[noreturn]] void refuseToSave(const std::string& file, const std::string& why) {
   throw ConfigError(file + ": " + why);
 }
 
@@ -133,7 +133,7 @@ class TemporaryFile {
  public:
   explicit TemporaryFile(const std::string& target) : name_(target + ".XXXXXX") {
     descriptor_ = ::mkstemp(name_.data());
-    if (descriptor_ < 0) refuse(target, std::string("cannot be written: ") + std::strerror(errno));
+    if (descriptor_ < 0) refuseToSave(target, std::string("cannot be written: ") + std::strerror(errno));
   }
   ~TemporaryFile() {
     if (descriptor_ >= 0) ::close(descriptor_);
@@ -185,21 +185,21 @@ void saveNetwork(const std::string& file, NetworkFile& network) {
   normalise(network);
   std::size_t inputs = 0;
   for (const InputGroup& group : network.inputs) inputs += group.count;
-  if (inputs != network.network.inputs()) refuse(file, "the input groups are not the network's inputs");
+  if (inputs != network.network.inputs()) refuseToSave(file, "the input groups are not the network's inputs");
   if (std::any_of(network.training.begin(), network.training.end(),
                   [](unsigned char c) { return c != '\n' && std::iscntrl(c) != 0; })) {
-    refuse(file, "the training record holds a control character");
+    refuseToSave(file, "the training record holds a control character");
   }
   const std::string text = fileText(network);
   NetworkFile read_back = parseNetwork(text, file);
   if (read_back.training != network.training || read_back.name != network.name ||
       read_back.network.parameters() != network.network.parameters()) {
-    refuse(file, "holds text that YAML cannot keep");
+    refuseToSave(file, "holds text that YAML cannot keep");
   }
   TemporaryFile temporary(file);
   if (!temporary.write(text) || loadNetwork(temporary.name()).sha256 != read_back.sha256 ||
       !temporary.moveTo(file)) {
-    refuse(file, std::string("cannot be written: ") + std::strerror(errno));
+    refuseToSave(file, std::string("cannot be written: ") + std::strerror(errno));
   }
   network.sha256 = read_back.sha256;
 }

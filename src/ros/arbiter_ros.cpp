@@ -12,7 +12,7 @@
 namespace tunnel_pilot::shell {
 namespace {
 
-constexpr double kPeriod = 0.02;  // [s]
+constexpr double kDecisionPeriod = 0.02;  // [s]
 
 supervision::Arbiter makeArbiter(const ros::NodeHandle& private_nh) {
   Parameters parameters(private_nh);
@@ -38,10 +38,10 @@ ArbiterRos::ArbiterRos(ros::NodeHandle nh, ros::NodeHandle private_nh)
   offerDriver(private_nh, supervision::Source::kLidarDriver);
   offerDriver(private_nh, supervision::Source::kPreviewDriver);
   if (ros::Time::isSimTime()) {
-    timer_ = nh.createTimer(ros::Duration(kPeriod), [this](const ros::TimerEvent&) { decide(); });
+    timer_ = nh.createTimer(ros::Duration(kDecisionPeriod), [this](const ros::TimerEvent&) { decide(); });
   } else {
     wall_timer_ =
-        nh.createWallTimer(ros::WallDuration(kPeriod), [this](const ros::WallTimerEvent&) { decide(); });
+        nh.createWallTimer(ros::WallDuration(kDecisionPeriod), [this](const ros::WallTimerEvent&) { decide(); });
   }
 }
 

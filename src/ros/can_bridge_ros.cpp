@@ -101,9 +101,9 @@ void CanBridgeRos::watchNodes(ros::NodeHandle& nh, const bridge::BridgeParameter
   for (const std::string& node : parameters.heartbeats) nodes.push_back(nh.resolveName(node));
   heartbeats_ = std::make_unique<bridge::HeartbeatWatch>(nodes, parameters.heartbeat_timeout);
   if (nodes.empty()) return;
-  heartbeat_subscriber_ = nh.subscribe<Heartbeat>(
+  heartbeat_subscriber_ = nh.subscribe<tunnel_pilot::Heartbeat>(
       "heartbeat", 100,
-      [this](const Heartbeat::ConstPtr& m) { heartbeats_->heard(m->node, steadyNow()); },
+      [this](const tunnel_pilot::Heartbeat::ConstPtr& m) { heartbeats_->heard(m->node, steadyNow()); },
       ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay());
 }
 

@@ -5,7 +5,7 @@
 namespace tunnel_pilot::shell {
 namespace {
 
-constexpr double kPeriod = 0.25;  // [s] steady time
+constexpr double kTellingPeriod = 0.25;  // [s] steady time
 
 }  // namespace
 
@@ -14,7 +14,7 @@ Diagnostics::Diagnostics(const ros::NodeHandle& nh, const ros::NodeHandle& priva
     : updater_(nh, private_nh, private_nh.getNamespace()) {
   updater_.setHardwareID("none");
   updater_.add(stage, [fill = std::move(fill)](Status& status) { fill(status); });
-  timer_ = nh.createWallTimer(ros::WallDuration(kPeriod),
+  timer_ = nh.createWallTimer(ros::WallDuration(kTellingPeriod),
                               [this](const ros::WallTimerEvent&) { updater_.force_update(); });
 }
 

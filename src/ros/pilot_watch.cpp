@@ -39,7 +39,9 @@ PilotWatch::PilotWatch(ros::NodeHandle nh) : nh_(nh) {
   count<sensor_msgs::JointState>("joint_states");
   count<nav_msgs::Odometry>("odom");
   count<TruckCommand>("command");
-  const boost::function<void(const Heartbeat&)> beat = [this](const auto& m) { alive_.insert(m.node); };
+  const boost::function<void(const tunnel_pilot::Heartbeat&)> beat = [this](const auto& m) {
+    alive_.insert(m.node);
+  };
   const boost::function<void(const Proposal&)> proposal = [this](const auto& m) {
     facts_.model = m.model;
   };
@@ -47,7 +49,7 @@ PilotWatch::PilotWatch(ros::NodeHandle nh) : nh_(nh) {
   const boost::function<void(const ArbiterState&)> arbiter = [this](const auto& m) {
     facts_.arbiter = m;
   };
-  subscribers_.push_back(nh_.subscribe<Heartbeat>("heartbeat", kQueue, beat));
+  subscribers_.push_back(nh_.subscribe<tunnel_pilot::Heartbeat>("heartbeat", kQueue, beat));
   subscribers_.push_back(nh_.subscribe<Proposal>("lidar_driver/proposal", 1, proposal));
   subscribers_.push_back(nh_.subscribe<TruckStatus>("truck_status", 1, truck));
   subscribers_.push_back(nh_.subscribe<ArbiterState>("arbiter_state", 1, arbiter));

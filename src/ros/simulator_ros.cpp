@@ -41,7 +41,8 @@ bool overtakes(const can::Frame& frame, Stamp stamp) {
 using visualization_msgs::Marker;
 using visualization_msgs::MarkerArray;
 
-Marker marker(const std::string& ns, int id, int type, float red, float green, float blue, float alpha) {
+Marker truthMarker(const std::string& ns, int id, int type, float red, float green, float blue,
+                   float alpha) {
   Marker m;
   m.header.frame_id = kMapFrame;
   m.ns = ns;
@@ -306,8 +307,8 @@ void SimulatorRos::publishTruth() {
 }
 
 void SimulatorRos::publishWalls() {
-  auto faces = marker("true_walls", 0, Marker::TRIANGLE_LIST, 0.75F, 0.75F, 0.8F, 0.22F);
-  auto edges = marker("true_walls", 1, Marker::LINE_LIST, 0.75F, 0.75F, 0.8F, 0.5F);
+  auto faces = truthMarker("true_walls", 0, Marker::TRIANGLE_LIST, 0.75F, 0.75F, 0.8F, 0.22F);
+  auto edges = truthMarker("true_walls", 1, Marker::LINE_LIST, 0.75F, 0.75F, 0.8F, 0.5F);
   edges.scale.x = 0.06;
   for (const auto& chain : simulator_->world().walls) {
     addFaces(chain, kPicturedHeight, faces);
@@ -324,10 +325,10 @@ void SimulatorRos::publishObstacles() {
   int id = 0;
   for (const auto& obstacle : simulator_->world().obstacles) {
     const auto outline = obstacle.chainAt(toSeconds(simulator_->now()));
-    auto body = marker("obstacles", id, Marker::TRIANGLE_LIST, 0.95F, 0.3F, 0.25F, 1.0F);
+    auto body = truthMarker("obstacles", id, Marker::TRIANGLE_LIST, 0.95F, 0.3F, 0.25F, 1.0F);
     addFaces(outline, kObstacleHeight, body);
     addLid(outline, kObstacleHeight, body);
-    auto name = marker("obstacle_names", id++, Marker::TEXT_VIEW_FACING, 1.0F, 0.75F, 0.7F, 1.0F);
+    auto name = truthMarker("obstacle_names", id++, Marker::TEXT_VIEW_FACING, 1.0F, 0.75F, 0.7F, 1.0F);
     const auto pose = obstacle.poseAt(toSeconds(simulator_->now()));
     name.pose.position = raised(geometry::Point(pose.x, pose.y), kObstacleHeight + 0.6);
     name.scale.z = 0.7;

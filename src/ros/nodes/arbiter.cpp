@@ -1,6 +1,8 @@
 #include "tunnel_pilot/ros/arbiter_ros.h"
 #include "tunnel_pilot/ros/stage.h"
 
-int main(int argc, char** argv) {
-  return tunnel_pilot::shell::runStage<tunnel_pilot::shell::ArbiterRos>(argc, argv, "arbiter");
-}
+namespace tunnel_pilot::shell::node {
+
+int arbiter(int argc, char** argv) { return runStage<ArbiterRos>(argc, argv, "arbiter"); }
+
+}  // namespace tunnel_pilot::shell::node

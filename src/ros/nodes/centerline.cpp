@@ -1,6 +1,8 @@
 #include "tunnel_pilot/ros/centerline_ros.h"
 #include "tunnel_pilot/ros/stage.h"
 
-int main(int argc, char** argv) {
-  return tunnel_pilot::shell::runStage<tunnel_pilot::shell::CenterlineRos>(argc, argv, "centerline");
-}
+namespace tunnel_pilot::shell::node {
+
+int centerline(int argc, char** argv) { return runStage<CenterlineRos>(argc, argv, "centerline"); }
+
+}  // namespace tunnel_pilot::shell::node

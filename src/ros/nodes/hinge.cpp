@@ -11,7 +11,7 @@
 #include "tunnel_pilot/ros/conversions.h"
 #include "tunnel_pilot/ros/parameters.h"
 
-namespace tunnel_pilot::shell {
+namespace tunnel_pilot::shell::node {
 namespace {
 
 constexpr double kTau = 6.283185307179586;
@@ -58,13 +58,12 @@ class Hinge {
 };
 
 }  // namespace
-}  // namespace tunnel_pilot::shell
 
-int main(int argc, char** argv) {
+int hinge(int argc, char** argv) {
   ros::init(argc, argv, "hinge");
   const ros::NodeHandle keep_alive;  // the log ends with the last handle, before it says why
   try {
-    tunnel_pilot::shell::Hinge hinge{ros::NodeHandle(), ros::NodeHandle("~")};
+    Hinge hinge{ros::NodeHandle(), ros::NodeHandle("~")};
     ros::spin();
   } catch (const std::exception& e) {
     ROS_FATAL("%s", e.what());
@@ -72,3 +71,5 @@ int main(int argc, char** argv) {
   }
   return 0;
 }
+
+}  // namespace tunnel_pilot::shell::node

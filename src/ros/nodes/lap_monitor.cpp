@@ -5,12 +5,14 @@
 #include <cstdio>
 #include <exception>
 
+namespace tunnel_pilot::shell::node {
+
 // Exit status 0: the lap passed. 1: it failed, or the parameters were refused.
-int main(int argc, char** argv) {
+int lap_monitor(int argc, char** argv) {
   ros::init(argc, argv, "lap_monitor");
   const ros::NodeHandle keep_alive;  // the log ends with the last handle, before it says why
   try {
-    tunnel_pilot::shell::LapMonitor monitor{ros::NodeHandle(), ros::NodeHandle("~")};
+    LapMonitor monitor{ros::NodeHandle(), ros::NodeHandle("~")};
     ros::spin();
     return monitor.passed().value_or(false) ? 0 : 1;
   } catch (const std::exception& e) {
@@ -18,3 +20,5 @@ int main(int argc, char** argv) {
     return 1;
   }
 }
+
+}  // namespace tunnel_pilot::shell::node

@@ -1,6 +1,8 @@
 #include "tunnel_pilot/ros/markers_ros.h"
 #include "tunnel_pilot/ros/stage.h"
 
-int main(int argc, char** argv) {
-  return tunnel_pilot::shell::runStage<tunnel_pilot::shell::MarkersRos>(argc, argv, "markers");
-}
+namespace tunnel_pilot::shell::node {
+
+int markers(int argc, char** argv) { return runStage<MarkersRos>(argc, argv, "markers"); }
+
+}  // namespace tunnel_pilot::shell::node

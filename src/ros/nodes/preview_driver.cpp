@@ -1,7 +1,10 @@
 #include "tunnel_pilot/ros/preview_driver_ros.h"
 #include "tunnel_pilot/ros/stage.h"
 
-int main(int argc, char** argv) {
-  return tunnel_pilot::shell::runStage<tunnel_pilot::shell::PreviewDriverRos>(argc, argv,
-                                                                              "preview_driver");
+namespace tunnel_pilot::shell::node {
+
+int preview_driver(int argc, char** argv) {
+  return runStage<PreviewDriverRos>(argc, argv, "preview_driver");
 }
+
+}  // namespace tunnel_pilot::shell::node

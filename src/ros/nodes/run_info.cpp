@@ -4,11 +4,13 @@
 
 #include <exception>
 
-int main(int argc, char** argv) {
+namespace tunnel_pilot::shell::node {
+
+int run_info(int argc, char** argv) {
   ros::init(argc, argv, "run_info");
   const ros::NodeHandle keep_alive;  // the log ends with the last handle, before it says why
   try {
-    const tunnel_pilot::shell::RunInfo info{ros::NodeHandle(), ros::NodeHandle("~")};
+    const RunInfo info{ros::NodeHandle(), ros::NodeHandle("~")};
     ros::spin();
   } catch (const std::exception& e) {
     ROS_FATAL("%s", e.what());
@@ -16,3 +18,5 @@ int main(int argc, char** argv) {
   }
   return 0;
 }
+
+}  // namespace tunnel_pilot::shell::node

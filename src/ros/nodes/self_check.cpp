@@ -7,8 +7,9 @@
 
 #include "tunnel_pilot/ros/pilot_watch.h"
 
-int main(int argc, char** argv) {
-  using tunnel_pilot::shell::Finding;
+namespace tunnel_pilot::shell::node {
+
+int self_check(int argc, char** argv) {
   ros::init(argc, argv, "self_check", ros::init_options::AnonymousName);
   const auto tell = [](const Finding& finding) { std::printf("%s\n", finding.line().c_str()); };
   const std::string master = "master: " + ros::master::getURI();
@@ -18,9 +19,11 @@ int main(int argc, char** argv) {
     return 1;
   }
   tell({true, master, ""});
-  tunnel_pilot::shell::PilotWatch watch{ros::NodeHandle()};
+  PilotWatch watch{ros::NodeHandle()};
   watch.watch();
   const auto findings = judge(watch.facts());
   for (const Finding& finding : findings) tell(finding);
   return allOk(findings) ? 0 : 1;
 }
+
+}  // namespace tunnel_pilot::shell::node

@@ -4,11 +4,13 @@
 
 #include "tunnel_pilot/ros/simulator_ros.h"
 
-int main(int argc, char** argv) {
+namespace tunnel_pilot::shell::node {
+
+int simulator(int argc, char** argv) {
   ros::init(argc, argv, "simulator");
   const ros::NodeHandle keep_alive;  // the log ends with the last handle, before it says why
   try {
-    tunnel_pilot::shell::SimulatorRos simulator{ros::NodeHandle(), ros::NodeHandle("~")};
+    SimulatorRos simulator{ros::NodeHandle(), ros::NodeHandle("~")};
     while (ros::ok()) simulator.advance();
   } catch (const std::exception& e) {
     ROS_FATAL("%s", e.what());
@@ -16,3 +18,5 @@ int main(int argc, char** argv) {
   }
   return 0;
 }
+
+}  // namespace tunnel_pilot::shell::node

@@ -8,17 +8,18 @@
 
 #include "tunnel_pilot/ros/status_ros.h"
 
-int main(int argc, char** argv) {
-  using tunnel_pilot::shell::Gravity;
+namespace tunnel_pilot::shell::node {
+
+int status(int argc, char** argv) {
   ros::init(argc, argv, "status", ros::init_options::AnonymousName);
   const ros::NodeHandle keep_alive;  // the log ends with the last handle, before it says why
   const bool terminal = isatty(STDOUT_FILENO) != 0;
   const auto tell = [terminal](const std::string& line, Gravity gravity) {
-    std::printf("%s\n", (terminal ? tunnel_pilot::shell::coloured(line, gravity) : line).c_str());
+    std::printf("%s\n", (terminal ? coloured(line, gravity) : line).c_str());
     std::fflush(stdout);
   };
   try {
-    const tunnel_pilot::shell::StatusRos status{ros::NodeHandle(), ros::NodeHandle("~"), tell};
+    const StatusRos status{ros::NodeHandle(), ros::NodeHandle("~"), tell};
     ros::spin();
   } catch (const std::exception& e) {
     ROS_FATAL("%s", e.what());
@@ -26,3 +27,5 @@ int main(int argc, char** argv) {
   }
   return 0;
 }
+
+}  // namespace tunnel_pilot::shell::node
