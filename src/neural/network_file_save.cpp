@@ -185,7 +185,8 @@ void saveNetwork(const std::string& file, NetworkFile& network) {
   normalise(network);
   std::size_t inputs = 0;
   for (const InputGroup& group : network.inputs) inputs += group.count;
-  if (inputs != network.network.inputs()) refuseToSave(file, "the input groups are not the network's inputs");
+  if (inputs != network.network.inputs())
+    refuseToSave(file, "the input groups are not the network's inputs");
   if (std::any_of(network.training.begin(), network.training.end(),
                   [](unsigned char c) { return c != '\n' && std::iscntrl(c) != 0; })) {
     refuseToSave(file, "the training record holds a control character");

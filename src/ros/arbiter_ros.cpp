@@ -38,10 +38,11 @@ ArbiterRos::ArbiterRos(ros::NodeHandle nh, ros::NodeHandle private_nh)
   offerDriver(private_nh, supervision::Source::kLidarDriver);
   offerDriver(private_nh, supervision::Source::kPreviewDriver);
   if (ros::Time::isSimTime()) {
-    timer_ = nh.createTimer(ros::Duration(kDecisionPeriod), [this](const ros::TimerEvent&) { decide(); });
+    timer_ =
+        nh.createTimer(ros::Duration(kDecisionPeriod), [this](const ros::TimerEvent&) { decide(); });
   } else {
-    wall_timer_ =
-        nh.createWallTimer(ros::WallDuration(kDecisionPeriod), [this](const ros::WallTimerEvent&) { decide(); });
+    wall_timer_ = nh.createWallTimer(ros::WallDuration(kDecisionPeriod),
+                                     [this](const ros::WallTimerEvent&) { decide(); });
   }
 }
 
