@@ -129,6 +129,7 @@ class CanBridge {
   bool standsStill(Stamp now) const;
   bool commandUsable(Stamp now) const;
   bool steeringEnabled(Stamp now) const;
+  bool tooOldOnTheBus(Stamp now) const;
   bool stopBit(Stamp now) const;
   double limitedAngle(double wanted, bool steering, Stamp now);
   double widestAngle() const;
