@@ -313,6 +313,13 @@ TEST(SteeringResponse, AResetForgetsWhatWasSent) {
   for (int i = 0; i < 30; ++i) EXPECT_EQ(response.step(0.3, ms(310 + 10 * i)), 0.3);
 }
 
+TEST(SteeringResponse, AResetBeginsTheTimeAnew) {
+  SteeringResponse response(0.0, 1.0, 1e-9);  // [rad/s]; no lag to speak of
+  response.reset(0.0, ms(0));
+  response.reset(0.0, ms(10000));
+  EXPECT_NEAR(response.step(1.0, ms(10020)), 0.02, 1e-12);
+}
+
 TrackingParameters tracking() {
   return loadBridge(config::loadFile(configFile("can_bridge.yaml"))).tracking;
 }
