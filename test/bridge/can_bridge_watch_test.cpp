@@ -183,6 +183,25 @@ TEST_P(Watchdog, TruckFault) {
   EXPECT_EQ(rig.bridge->status().faults & can::kFaultBrake, can::kFaultBrake);
 }
 
+// What drops the fault from one of the two frames that tell of it.
+TEST_P(Watchdog, TruckFaultInOneOfItsFramesIsEnough) {
+  for (const bool in_feedback : {true, false}) {
+    Rig other(GetParam());
+    other.to_bridge = [in_feedback](const can::Frame& f) {
+      auto feedback = can::decode<can::TruckFeedbackFrame>(f);
+      auto status = can::decode<can::TruckStatusFrame>(f);
+      if (feedback && !in_feedback) feedback->fault = false;
+      if (status && in_feedback) status->faults = 0;
+      return feedback ? can::encode(*feedback) : status ? can::encode(*status) : f;
+    };
+    other.drive();
+    ASSERT_EQ(other.state(), SafetyState::kActive);
+    other.controller->setFaults(can::kFaultBrake);
+    EXPECT_LE(other.timeToStop(), 0.022 + GetParam()) << in_feedback;
+    EXPECT_EQ(other.reason(), Reason::kTruckFault);
+  }
+}
+
 TEST_P(Watchdog, TruckThatDoesNotObey) {
   rig.to_truck = [](can::Frame f) { return std::optional<can::Frame>(f); };
   rig.to_bridge = [](can::Frame f) {
@@ -232,6 +251,14 @@ TEST_P(Watchdog, ClockThatJumpsBack) {
   EXPECT_EQ(rig.state(), SafetyState::kStopping);
   EXPECT_EQ(rig.reason(), Reason::kClockJump);
   EXPECT_FALSE(rig.bridge->motionFresh(jumped));
+}
+
+TEST_P(Watchdog, ClockThatJumpsBeforeAnyCommandCame) {
+  rig.arbiter_alive = false;
+  rig.run(0.5);
+  rig.bridge->clockJumped(rig.now + fromSeconds(100.0));
+  EXPECT_EQ(rig.state(), SafetyState::kInit);
+  EXPECT_TRUE(std::isinf(rig.bridge->status().command_age));
 }
 
 TEST_P(Watchdog, ClockThatJumpsDisarmsBeforeDriving) {
