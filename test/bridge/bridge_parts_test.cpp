@@ -458,12 +458,12 @@ TEST(TransmitWatch, AThirdSetIsNotTakenIn) {
   EXPECT_FALSE(watch.stalled());
 }
 
-TEST(TransmitWatch, StallsWhenTheOldestFrameIs35MillisecondsOld) {
+TEST(TransmitWatch, StallsWhenTheOldestFrameIs34AndAHalfMillisecondsOld) {
   TransmitWatch watch;
   watch.sent(1, ms(0));
-  watch.update(1, ms(34));
+  watch.update(1, std::chrono::microseconds(34499));
   EXPECT_FALSE(watch.stalled());
-  watch.update(1, ms(35));
+  watch.update(1, std::chrono::microseconds(34500));
   EXPECT_TRUE(watch.stalled());
 }
 
