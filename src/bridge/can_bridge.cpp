@@ -20,6 +20,9 @@ constexpr double kMaxFrameAngle = 45.0 * kPi / 180.0;  // the .dbc's range of Ar
 constexpr Stamp kDiscardPeriod = std::chrono::milliseconds(500);  // a bus that stays off is not hurried
 constexpr std::size_t kLongestRejection = 64;                     // kept without an allocation
 constexpr double kRounding = 1e-6;  // beyond a limit, by arithmetic alone [rad], [m/s]
+// From the time of a tick until its frame is on the bus, at most: what the tick computes, and a frame of
+// the others' and one's own at 250 kbit/s, 0.6 ms each.
+constexpr Stamp kLeaving = std::chrono::milliseconds(2);
 
 // Reasons with which the arbiter tells that it drives on in less than full health. The others either
 // come with a stop or (clearance, obstacle) are answered by the speed it asks for.
@@ -123,14 +126,16 @@ void CanBridge::setCommand(const Command& command, Stamp now) {
   if (command.stop) advance(now);
 }
 
+std::string CanBridge::inWords(Event fault) const {
+  std::string detail;
+  if (fault == Event::kBusFault) detail = bus_.trouble();
+  if (fault == Event::kProcessSilent) detail = *silent_process_;
+  if (!detail.empty()) detail = ": " + detail;
+  return toString(fault) + detail;
+}
+
 std::optional<std::string> CanBridge::whyUnhealthy(Stamp now) const {
-  const std::optional<Event> fault = anyFault(now);
-  if (fault) {
-    const std::string detail = fault == Event::kBusFault        ? bus_.trouble()
-                               : fault == Event::kProcessSilent ? *silent_process_
-                                                                : "";
-    return toString(*fault) + (detail.empty() ? "" : ": " + detail);
-  }
+  if (const std::optional<Event> fault = anyFault(now)) return inWords(*fault);
   if (!lasts(healthy_since_, parameters_.health_time, now)) return "inputs not healthy for long enough";
   return std::nullopt;
 }
@@ -185,7 +190,6 @@ void CanBridge::clockJumped(Stamp now) {
   link_healthy_since_.reset();
   healthy_since_.reset();
   undegraded_since_.reset();
-  obeyed_.reset();
   standing_since_.reset();
   entered_ = sent_at_ = last_tick_ = now;
   watch_.reset(link_.feedback().articulation_angle, now);
@@ -226,11 +230,11 @@ std::optional<Event> CanBridge::commandFault(Stamp now) const {
   return std::nullopt;
 }
 
+// Asked for while driving: there is a command.
 std::optional<Event> CanBridge::drivingFault(Stamp now) const {
-  if (obeyed_ && now - *obeyed_ > fromSeconds(parameters_.obedience_timeout))
-    return Event::kTruckRefuses;
+  if (now - obeyed_ > fromSeconds(parameters_.obedience_timeout)) return Event::kTruckRefuses;
   if (watch_.failed(now)) return Event::kTrackingError;
-  if (command_ && command_->command.stop) return Event::kCommandStop;
+  if (command_->command.stop) return Event::kCommandStop;
   return std::nullopt;
 }
 
@@ -266,8 +270,7 @@ void CanBridge::raise(Event event, Stamp now, Reason carried) {
   entered_ = now;
   undegraded_since_.reset();
   held_angle_.reset();
-  if (row->to == S::kActive && !obeyed_) obeyed_ = now;  // the truck's time to obey begins
-  if (!isEngaged(row->to)) obeyed_.reset();
+  if (event == Event::kCommandReady) obeyed_ = now;  // the truck's time to obey begins
 }
 
 void CanBridge::tick(Stamp now) {
@@ -286,7 +289,7 @@ void CanBridge::listen(Stamp now) {
   std::optional<double> gyro;
   if (link_.fresh(now)) gyro = link_.motion().yaw_rate;
   odometry_.update(feedback.articulation_angle, feedback.articulation_rate, feedback.speed, gyro, now);
-  if (feedback.autonomy_enabled && obeyed_) obeyed_ = now;
+  if (feedback.autonomy_enabled) obeyed_ = now;
 }
 
 void CanBridge::clearBus(Stamp now) {
@@ -368,12 +371,12 @@ bool CanBridge::standsStill(Stamp now) const {
 
 // -------- what is sent
 
-bool CanBridge::commandUsable(Stamp now) const { return !commandFault(now); }
+bool CanBridge::commandUsable(Stamp now) const { return !commandFault(now + kLeaving); }
 
 bool CanBridge::steeringEnabled(Stamp now) const {
   const bool may = drives(status_.state) || (status_.state == S::kStopping && stop_steers_);
   const can::TruckFeedbackFrame& feedback = link_.feedback();
-  return may && link_.fresh(now) && feedback.operator_enable && !feedback.operator_override;
+  return may && link_.fresh(now + kLeaving) && feedback.operator_enable && !feedback.operator_override;
 }
 
 bool CanBridge::stopBit(Stamp now) const {
@@ -400,8 +403,15 @@ double CanBridge::widestAngle() const {
   return vehicle::steadyArticulation(truck_, parameters_.max_lateral_acceleration / (speed * speed));
 }
 
+// What drives may be too old once it is on the bus, though it is not yet: then nothing is sent, and the
+// next tick has news or stops.
+bool CanBridge::tooOldOnTheBus(Stamp now) const {
+  return drives(status_.state) && (!link_.fresh(now + kLeaving) || !commandUsable(now));
+}
+
 void CanBridge::sendIfDue(Stamp now) {
   if (transmit_.full() || transmit_.stalled() || !sender_.due(stopBit(now), now)) return;
+  if (tooOldOnTheBus(now)) return;
   const can::TruckCommandFrame command = composeCommand(now);
   const can::CommandInfoFrame info = composeInfo(now);
   const std::uint64_t in_flight = bus_.inFlight();
@@ -417,7 +427,6 @@ void CanBridge::sendIfDue(Stamp now) {
 can::TruckCommandFrame CanBridge::composeCommand(Stamp now) {
   const bool steering = steeringEnabled(now);
   const bool stopping = isStop(status_.state);
-  const bool driving = isEngaged(status_.state) && status_.state != S::kArmed;
   const double measured = link_.feedback().articulation_angle;
   if (commandUsable(now)) {
     held_angle_.reset();
@@ -432,7 +441,7 @@ can::TruckCommandFrame CanBridge::composeCommand(Stamp now) {
       isEngaged(status_.state) || status_.state == S::kStopping ? command.mode : Mode::kStandby);
   frame.articulation_angle =
       limitedAngle(held_angle_.value_or(command.articulation_angle), steering, now);
-  if (driving && steering && !frame.stop) {
+  if (steering && !frame.stop) {
     const double highest =
         status_.state == S::kDegraded ? parameters_.degraded_speed : parameters_.max_speed;
     frame.speed = std::clamp(command.speed, 0.0, highest);

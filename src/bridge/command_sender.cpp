@@ -10,10 +10,9 @@ CommandSender::CommandSender(double period) : period_(fromSeconds(period)) {}
 
 void CommandSender::forgetTime(Stamp now) {
   started_ = false;
-  if (sets_sent_ == 0) return;
   // As if the last set had been sent right now: a little strict, and a clock that jumps on and on is
   // bounded.
-  const Stamp shift = now - sent_at_[(sets_sent_ - 1) % kMaxFrames];
+  const Stamp shift = now - sent_at_[(sets_sent_ + kMaxFrames - 1) % kMaxFrames];
   for (Stamp& at : sent_at_) at += shift;
 }
 

@@ -17,7 +17,6 @@ void TransmitWatch::update(std::uint64_t in_flight, Stamp now) {
     std::move(sets_.begin() + 1, sets_.end(), sets_.begin());
     --count_;
   }
-  if (count_ > 0) sets_[0].frames -= settled;
   stalled_ = count_ > 0 && now - sets_[0].at >= kMaxAge;
 }
 

@@ -46,9 +46,8 @@ std::optional<Frame> SocketCanBus::receive() {
   read_out_ = false;
   while (open_) {
     const Received received = socket_->receive();
-    if (received.kind == Received::Kind::kNothing) break;
     if (const auto frame = take(received)) return frame;
-    if (received.kind == Received::Kind::kError) break;
+    if (received.kind == Received::Kind::kNothing || received.kind == Received::Kind::kError) break;
   }
   watchLink();
   takeCycle();
@@ -74,7 +73,7 @@ std::optional<Frame> SocketCanBus::take(const Received& received) {
     case Received::Kind::kError:
       takeError(received.error);
       break;
-    case Received::Kind::kNothing:
+    default:  // nothing
       break;
   }
   return std::nullopt;

@@ -282,8 +282,8 @@ void Arbiter::assessSources(Stamp now, Findings& findings) const {
     if (!rule.steers) continue;
     const Health state = health(rule, now);
     causes.stopFor(kCauses.at(static_cast<std::size_t>(state)));
-    if (state == Health::kStale) excused = excused || waitsForScan(rule, now);
-    if (state == Health::kUnable) excused = excused || tunnel_lost;
+    if (state == Health::kStale && waitsForScan(rule, now)) excused = true;
+    if (state == Health::kUnable && tunnel_lost) excused = true;
   }
   if (!excused) findings.stopFor(causes.stop);
 }

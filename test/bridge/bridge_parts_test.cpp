@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tunnel_pilot/bridge/bridge_parameters.h"
@@ -313,6 +314,13 @@ TEST(SteeringResponse, AResetForgetsWhatWasSent) {
   for (int i = 0; i < 30; ++i) EXPECT_EQ(response.step(0.3, ms(310 + 10 * i)), 0.3);
 }
 
+TEST(SteeringResponse, AResetBeginsTheTimeAnew) {
+  SteeringResponse response(0.0, 1.0, 1e-9);  // [rad/s]; no lag to speak of
+  response.reset(0.0, ms(0));
+  response.reset(0.0, ms(10000));
+  EXPECT_NEAR(response.step(1.0, ms(10020)), 0.02, 1e-12);
+}
+
 TrackingParameters tracking() {
   return loadBridge(config::loadFile(configFile("can_bridge.yaml"))).tracking;
 }
@@ -450,12 +458,12 @@ TEST(TransmitWatch, AThirdSetIsNotTakenIn) {
   EXPECT_FALSE(watch.stalled());
 }
 
-TEST(TransmitWatch, StallsWhenTheOldestFrameIs35MillisecondsOld) {
+TEST(TransmitWatch, StallsWhenTheOldestFrameIs34AndAHalfMillisecondsOld) {
   TransmitWatch watch;
   watch.sent(1, ms(0));
-  watch.update(1, ms(34));
+  watch.update(1, std::chrono::microseconds(34499));
   EXPECT_FALSE(watch.stalled());
-  watch.update(1, ms(35));
+  watch.update(1, std::chrono::microseconds(34500));
   EXPECT_TRUE(watch.stalled());
 }
 
@@ -534,6 +542,53 @@ TEST(CommandSender, KeepsItsPeriodThoughTicksComeALittleEarlyOrLate) {
   EXPECT_EQ(sets, 100);
 }
 
+TEST(CommandSender, ATickMayComeHalfAMillisecondEarly) {
+  CommandSender sender(0.02);
+  can::MemoryBusHub hub;
+  const auto bus = hub.connect();
+  sender.send({}, {}, {}, *bus, ms(0));
+  EXPECT_FALSE(sender.due(false, std::chrono::microseconds(19499)));
+  EXPECT_TRUE(sender.due(false, std::chrono::microseconds(19500)));
+}
+
+// When the set after one that was sent at `second` [us] is due, the first having been sent at 0 [us].
+int nextAfter(int second) {
+  CommandSender sender(0.02);
+  can::MemoryBusHub hub;
+  const auto bus = hub.connect();
+  const auto us = [](int time) { return std::chrono::microseconds(time); };
+  sender.send({}, {}, {}, *bus, us(0));
+  sender.send({}, {}, {}, *bus, us(second));
+  int time = second;
+  while (!sender.due(false, us(time))) time += 100;
+  return time + 500;
+}
+
+TEST(CommandSender, KeepsItsStepUnlessAPeriodWasMissed) {
+  EXPECT_EQ(nextAfter(20000), 40000);
+  EXPECT_EQ(nextAfter(19500), 40000) << "early";
+  EXPECT_EQ(nextAfter(25000), 40000) << "late";
+  EXPECT_EQ(nextAfter(39900), 40400) << "so late that the next comes at once";
+  EXPECT_EQ(nextAfter(40000), 60000) << "a period too late: nothing is made up for";
+  EXPECT_EQ(nextAfter(5000), 25000) << "a stop between";
+  EXPECT_EQ(nextAfter(19400), 39400) << "likewise";
+}
+
+TEST(CommandSender, AStopIsDueAtOnceUntilItWasTold) {
+  CommandSender sender(0.02);
+  can::MemoryBusHub hub;
+  const auto bus = hub.connect();
+  can::TruckCommandFrame stop;
+  stop.stop = true;
+  sender.send({}, {}, {}, *bus, ms(0));
+  EXPECT_TRUE(sender.due(true, ms(5)));
+  sender.send(stop, {}, {}, *bus, ms(5));
+  EXPECT_FALSE(sender.due(true, ms(10)));
+  EXPECT_TRUE(sender.due(true, ms(25)));
+  sender.send({}, {}, {}, *bus, ms(25));
+  EXPECT_TRUE(sender.due(true, ms(26))) << "another one";
+}
+
 TEST(CommandSender, MakesUpForNothingAfterAGap) {
   can::MemoryBusHub hub;
   const auto bus = hub.connect();
@@ -545,6 +600,24 @@ TEST(CommandSender, MakesUpForNothingAfterAGap) {
   sender.send({}, {}, {}, *bus, ms(500));
   EXPECT_FALSE(sender.due(false, ms(519)));
   EXPECT_EQ(sender.framesSent(), 6u);
+}
+
+TEST(CommandSender, TheThreeFramesOfASetCarryTheSameCounterEachSetTheNext) {
+  can::MemoryBusHub hub;
+  const auto bus = hub.connect(), wire = hub.connect();
+  CommandSender sender(0.02);
+  std::uint8_t before = 0;
+  for (int i = 0; i < 20; ++i) {
+    sender.send({}, {}, {}, *bus, ms(20 * i));
+    const auto command = can::decode<can::TruckCommandFrame>(*wire->receive());
+    const auto info = can::decode<can::CommandInfoFrame>(*wire->receive());
+    const auto status = can::decode<can::BridgeStatusFrame>(*wire->receive());
+    ASSERT_TRUE(command && info && status);
+    EXPECT_EQ(command->counter, can::nextCounter(before));
+    EXPECT_EQ(info->counter, command->counter);
+    EXPECT_EQ(status->counter, command->counter);
+    before = command->counter;
+  }
 }
 
 TEST(CommandSender, IsBrokenAfterThreeSetsThatCouldNotBeSent) {
@@ -560,6 +633,12 @@ TEST(CommandSender, IsBrokenAfterThreeSetsThatCouldNotBeSent) {
   hub.setState(can::BusState::kActive);
   sender.send({}, {}, {}, *bus, ms(60));
   EXPECT_FALSE(sender.broken());
+  hub.setState(can::BusState::kDown);
+  for (int i = 4; i < 7; ++i) {
+    EXPECT_FALSE(sender.broken()) << "three again";
+    sender.send({}, {}, {}, *bus, ms(20 * i));
+  }
+  EXPECT_TRUE(sender.broken());
 }
 
 TEST(CommandSender, BlocksTheSeventeenthFrameOfAQuarterSecond) {
@@ -583,6 +662,21 @@ TEST(CommandSender, IsBoundThoughTheClockJumpsAgainAndAgain) {
     if (sender.due(false, now) && sender.send({}, {}, {}, *bus, now)) ++sent;
   }
   EXPECT_EQ(sent, 16);
+}
+
+// The last set counts as sent at the jump, those before as long before it as they were.
+TEST(CommandSender, TheBoundOnTheRateGoesOnOverAClockJump) {
+  for (const int before : {1, 2, 16}) {
+    can::MemoryBusHub hub;
+    const auto bus = hub.connect();
+    CommandSender sender(0.02);
+    for (int i = 0; i < before; ++i) sender.send({}, {}, {}, *bus, ms(100000 + 10 * i));
+    sender.forgetTime(ms(5000));
+    for (int i = before; i < 16; ++i) EXPECT_TRUE(sender.send({}, {}, {}, *bus, ms(5001)));
+    const int oldest = 5000 - 10 * (before - 1);
+    EXPECT_FALSE(sender.send({}, {}, {}, *bus, ms(oldest + 250))) << before;
+    EXPECT_TRUE(sender.send({}, {}, {}, *bus, ms(oldest + 251))) << before;
+  }
 }
 
 TEST(CommandSender, ADriveAtItsPaceSendsAtOnceAfterAClockJump) {
@@ -653,6 +747,47 @@ TEST(TruckLink, AnyFrameOfOurOwnFromElsewhereIsAForeignSenders) {
   }
 }
 
+// A bus that is told the time, and has a frame of the truck's in every other call.
+class TellingBus : public ShortBus {
+ public:
+  TellingBus() : ShortBus(0) {}
+  void tick(Stamp now) override {
+    ticks.push_back(now);
+    if (ticks.size() % 2 == 1) waiting_ = can::encode(can::TruckFeedbackFrame());
+  }
+  std::optional<can::Frame> receive() override { return std::exchange(waiting_, std::nullopt); }
+  std::vector<Stamp> ticks;
+
+ private:
+  std::optional<can::Frame> waiting_;
+};
+
+TEST(TruckLink, TellsTheBusTheTimeBeforeItReadsAndOfNewFeedbackOnce) {
+  TellingBus bus;
+  TruckLink link(0.06);
+  EXPECT_TRUE(link.receive(bus, ms(7)));
+  EXPECT_FALSE(link.receive(bus, ms(12)));
+  EXPECT_EQ(bus.ticks, (std::vector<Stamp>{ms(7), ms(12)}));
+}
+
+TEST(TruckLink, AFirstFrameCameAtTheFirstCallALaterOneAfterTheCallBefore) {
+  TellingBus bus;
+  TruckLink link(0.06);
+  link.receive(bus, ms(1000));
+  EXPECT_EQ(link.feedbackStamp(), ms(1000));
+  can::MemoryBusHub hub;
+  const auto own = hub.connect(), peer = hub.connect();
+  can::TruckFeedbackFrame next;
+  next.counter = 1;
+  peer->send(*can::encode(next));
+  link.receive(*own, ms(1005));
+  EXPECT_EQ(link.feedbackStamp(), ms(1000));
+  next.counter = 2;
+  peer->send(*can::encode(next));
+  link.receive(*own, ms(1010));
+  EXPECT_EQ(link.feedbackStamp(), ms(1005));
+}
+
 TEST(TruckLink, TakesTheOperatorsInputsAndTheCoils) {
   can::MemoryBusHub hub;
   const auto bus = hub.connect(), peer = hub.connect();
@@ -706,6 +841,20 @@ TEST(TruckLink, CorruptFramesOfTheOperatorAndTheCoilsAreOnlyCounted) {
   EXPECT_EQ(link.framesRejected(), 9u);
 }
 
+TEST(TruckLink, AFrameOf29BitsIsNobodysWhateverItsNumber) {
+  can::MemoryBusHub hub;
+  const auto bus = hub.connect(), peer = hub.connect();
+  TruckLink link(0.06);
+  for (can::Frame frame :
+       {*can::encode(can::TruckFeedbackFrame()), *can::encode(can::TruckCommandFrame())}) {
+    frame.extended = true;
+    peer->send(frame);
+  }
+  EXPECT_FALSE(link.receive(*bus, ms(0)));
+  EXPECT_FALSE(link.foreignSender());
+  EXPECT_EQ(link.framesRejected(), 2u);
+}
+
 TEST(TruckLink, ARepeatedFrameIsRejected) {
   const can::Frame frames[] = {
       *can::encode(can::TruckFeedbackFrame()), *can::encode(can::TruckMotionFrame()),
@@ -736,6 +885,51 @@ TEST(TruckLink, IsOldUntilAllThreeFramesCame) {
     }
     link.receive(*bus, ms(0));
     EXPECT_TRUE(std::isinf(link.age(ms(0)))) << missing;
+  }
+}
+
+TEST(TruckLink, IsAsOldAsTheOldestOfTheThree) {
+  const can::Frame frames[] = {*can::encode(can::TruckFeedbackFrame()),
+                               *can::encode(can::TruckMotionFrame()),
+                               *can::encode(can::TruckStatusFrame())};
+  for (std::size_t first = 0; first < 3; ++first) {
+    can::MemoryBusHub hub;
+    const auto bus = hub.connect(), peer = hub.connect();
+    TruckLink link(0.06);
+    for (std::size_t i = 0; i < 3; ++i) {  // each comes just after the call at 1000, 1010, 1020 ms
+      link.receive(*bus, ms(static_cast<int>(1000 + 10 * i)));
+      peer->send(frames[(first + i) % 3]);
+    }
+    link.receive(*bus, ms(1030));
+    EXPECT_NEAR(link.age(ms(1040)), 0.040, 1e-12) << first;
+  }
+}
+
+TEST(TruckLink, AfterAClockThatJumpedEachOfTheThreeMustComeAnew) {
+  for (std::size_t missing = 0; missing < 4; ++missing) {
+    can::MemoryBusHub hub;
+    const auto bus = hub.connect(), peer = hub.connect();
+    TruckLink link(0.06);
+    const auto send = [&](std::uint8_t counter, std::size_t but) {
+      can::TruckFeedbackFrame feedback;
+      can::TruckMotionFrame motion;
+      can::TruckStatusFrame status;
+      feedback.counter = motion.counter = status.counter = counter;
+      if (but != 0) peer->send(*can::encode(feedback));
+      if (but != 1) peer->send(*can::encode(motion));
+      if (but != 2) peer->send(*can::encode(status));
+    };
+    send(1, 3);
+    link.receive(*bus, ms(100000));
+    link.forgetTime();
+    EXPECT_TRUE(std::isinf(link.age(ms(5000))));
+    send(2, missing);
+    link.receive(*bus, ms(5000));
+    if (missing < 3) {
+      EXPECT_TRUE(std::isinf(link.age(ms(5000)))) << missing;
+    } else {
+      EXPECT_NEAR(link.age(ms(5010)), 0.010, 1e-12) << "no call of the other time counts";
+    }
   }
 }
 

@@ -58,6 +58,21 @@ TEST_F(CanBridgeTest, RefusesToEngageWhileTheArbiterSeesNoTunnel) {
   EXPECT_EQ(rig.bridge->engage(rig.now).reason, "no valid tunnel");
 }
 
+TEST_F(CanBridgeTest, RefusesToEngageBeforeAWallOrAnObstacle) {
+  rig.command.stop = true;
+  for (const Reason reason : {Reason::kClearance, Reason::kObstacle}) {
+    rig.command.reason = reason;
+    rig.run(2.0);
+    EXPECT_EQ(rig.bridge->engage(rig.now).reason, supervision::toString(reason));
+  }
+}
+
+TEST_F(CanBridgeTest, RefusesToEngageWithoutABus) {
+  rig.run(1.5);
+  rig.bridge_side.setState(can::BusState::kBusOff);
+  EXPECT_EQ(rig.bridge->engage(rig.now).reason, "bus fault");
+}
+
 TEST_F(CanBridgeTest, FirstFramesAfterEngagingAreNotIntendedToSteer) {
   rig.run(1.5);
   const std::size_t before = rig.judge.commands.size();
@@ -206,6 +221,18 @@ TEST_F(CanBridgeTest, TakesAnArbiterThatStartedAgainOnlyWhenNotDriving) {
   EXPECT_EQ(rig.judge.last_info->sequence, sent + 1) << "lifted above all before";
 }
 
+TEST_F(CanBridgeTest, AnArbiterThatStartsAgainWhileTheTruckStopsIsRefused) {
+  rig.drive();
+  rig.bridge->stop(rig.now);
+  rig.arbiter_alive = false;
+  ASSERT_EQ(rig.state(), SafetyState::kStopping);
+  Command first = rig.command;
+  first.sequence = 0;
+  first.stamp = rig.now;
+  rig.bridge->setCommand(first, rig.now);
+  EXPECT_EQ(rig.bridge->status().command_rejection, "sequence decreases");
+}
+
 // -------- stopping
 
 TEST_F(CanBridgeTest, OperatorsStopIsOnTheBusWithinTheCallInEveryState) {
@@ -291,6 +318,18 @@ TEST_F(CanBridgeTest, ResetIsRefusedWhileStoppingAndUntilAllIsHealthyForOneSecon
   rig.run(0.9);
   EXPECT_EQ(rig.bridge->reset(rig.now).reason, "inputs not healthy for long enough");
   rig.run(0.2);
+  EXPECT_TRUE(rig.bridge->reset(rig.now).accepted);
+}
+
+TEST_F(CanBridgeTest, ResetIsRefusedWhileTheTruckMoves) {
+  rig.drive();
+  rig.bridge->stop(rig.now);
+  rig.run(10.0, [&] { return rig.state() == SafetyState::kStopped; });
+  rig.run(1.0);
+  rig.plant.reset(geometry::Pose(), 0.0, 1.0);  // pushed
+  rig.run(0.05);
+  EXPECT_EQ(rig.bridge->reset(rig.now).reason, "the truck moves");
+  rig.run(5.0);
   EXPECT_TRUE(rig.bridge->reset(rig.now).accepted);
 }
 

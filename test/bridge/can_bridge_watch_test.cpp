@@ -3,6 +3,8 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <memory>
+#include <optional>
 #include <vector>
 
 #include "rig.h"
@@ -181,6 +183,25 @@ TEST_P(Watchdog, TruckFault) {
   EXPECT_EQ(rig.bridge->status().faults & can::kFaultBrake, can::kFaultBrake);
 }
 
+// What drops the fault from one of the two frames that tell of it.
+TEST_P(Watchdog, TruckFaultInOneOfItsFramesIsEnough) {
+  for (const bool in_feedback : {true, false}) {
+    Rig other(GetParam());
+    other.to_bridge = [in_feedback](const can::Frame& f) {
+      auto feedback = can::decode<can::TruckFeedbackFrame>(f);
+      auto status = can::decode<can::TruckStatusFrame>(f);
+      if (feedback && !in_feedback) feedback->fault = false;
+      if (status && in_feedback) status->faults = 0;
+      return feedback ? can::encode(*feedback) : status ? can::encode(*status) : f;
+    };
+    other.drive();
+    ASSERT_EQ(other.state(), SafetyState::kActive);
+    other.controller->setFaults(can::kFaultBrake);
+    EXPECT_LE(other.timeToStop(), 0.022 + GetParam()) << in_feedback;
+    EXPECT_EQ(other.reason(), Reason::kTruckFault);
+  }
+}
+
 TEST_P(Watchdog, TruckThatDoesNotObey) {
   rig.to_truck = [](can::Frame f) { return std::optional<can::Frame>(f); };
   rig.to_bridge = [](can::Frame f) {
@@ -230,6 +251,14 @@ TEST_P(Watchdog, ClockThatJumpsBack) {
   EXPECT_EQ(rig.state(), SafetyState::kStopping);
   EXPECT_EQ(rig.reason(), Reason::kClockJump);
   EXPECT_FALSE(rig.bridge->motionFresh(jumped));
+}
+
+TEST_P(Watchdog, ClockThatJumpsBeforeAnyCommandCame) {
+  rig.arbiter_alive = false;
+  rig.run(0.5);
+  rig.bridge->clockJumped(rig.now + fromSeconds(100.0));
+  EXPECT_EQ(rig.state(), SafetyState::kInit);
+  EXPECT_TRUE(std::isinf(rig.bridge->status().command_age));
 }
 
 TEST_P(Watchdog, ClockThatJumpsDisarmsBeforeDriving) {
@@ -311,6 +340,65 @@ TEST(WatchdogLatency, WorstOfAllPhasesIsWithinItsLimit) {
                   row.name, 1e3 * worst, 1e3 * row.limit);
     }
   }
+}
+
+// -------- a frame is on the bus a little after its tick
+
+constexpr Stamp kLeaving = std::chrono::milliseconds(2);  // docs/can.md
+
+// Driving, with the bridge's ticks moved against the truck's frames by `phase` [ms].
+std::unique_ptr<Rig> drivingRig(double tick, int phase) {
+  auto rig = std::make_unique<Rig>(tick);
+  rig->drive(1.0);
+  rig->tick_period += 0.001 * phase;
+  rig->run(rig->tick_period);
+  rig->tick_period = tick;
+  rig->run(0.1);
+  return rig;
+}
+
+Stamp lastThatDrives(const Rig& rig) {
+  std::size_t i = rig.judge.commands.size() - 1;
+  while (!rig.judge.commands[i].steering_enable || rig.judge.commands[i].stop) --i;
+  return rig.judge.times[i];
+}
+
+TEST(WatchdogLatency, NothingDrivesOnWhatIsTooOldOnceItIsOnTheBus) {
+  for (const double tick : {0.001, 0.005, 0.020}) {
+    for (int phase = 0; phase < 20; ++phase) {
+      const auto rig = drivingRig(tick, phase);
+      rig->truck_alive = false;
+      rig->run(0.2);
+      EXPECT_LE(lastThatDrives(*rig) + kLeaving - rig->last_feedback, ms(60)) << tick << ", " << phase;
+
+      const auto other = drivingRig(tick, phase);
+      other->measurement = other->now;
+      other->run(0.5);
+      EXPECT_LE(lastThatDrives(*other) + kLeaving - *other->measurement, ms(300))
+          << tick << ", " << phase;
+    }
+  }
+}
+
+TEST(WatchdogLatency, FramesOfTheTruckThatComeAtTheLimitLetItDriveOnWithoutABreak) {
+  const auto rig = drivingRig(0.020, 0);
+  std::vector<can::Frame> late;
+  rig->to_bridge = [&](const can::Frame& f) {
+    late.push_back(f);
+    return std::optional<can::Frame>();
+  };
+  const auto age = [&] { return rig->bridge->status().feedback_age; };
+  rig->run(0.1, [&] { return age() > 0.0599; });
+  ASSERT_NEAR(age(), 0.060, 1e-6);
+  EXPECT_EQ(rig->now - rig->judge.times.back(), ms(20)) << "this tick sends nothing";
+  rig->to_bridge = [](const can::Frame& f) { return std::optional<can::Frame>(f); };
+  for (const can::Frame& frame : late) rig->wire_to_bridge->send(frame);
+  const std::size_t before = rig->judge.commands.size();
+  rig->run(0.1);
+  EXPECT_EQ(rig->state(), SafetyState::kActive);
+  for (std::size_t i = before; i < rig->judge.commands.size(); ++i)
+    EXPECT_TRUE(rig->judge.commands[i].steering_enable);
+  EXPECT_TRUE(rig->judge.complaints.empty());
 }
 
 // -------- DEGRADED

@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 """Makes docs/ros_campaign.md from what the campaign injected and what the monitor found; for scripts/ros_campaign.
 
-Exit status 1 when a frame of the pilot's was unsafe or there was nothing to judge.
+Exit status 1 when a frame of the pilot's was unsafe or there was nothing to judge. With --bad-sender LOG, 0 only when every
+frame of the bad sender's in that log was found for what it breaks: the angle leaps, and where another of its own came just
+before, the counter stands.
 """
 import argparse
 import json
@@ -13,6 +15,7 @@ parser.add_argument('judged')
 for name in ('seed', 'asked'):
     parser.add_argument(f'--{name}', type=int, required=True)
 parser.add_argument('--python', required=True, help='what the monitor ran in')
+parser.add_argument('--bad-sender', metavar='LOG')
 options = parser.parse_args()
 with open(options.report, encoding='utf-8') as file:
     report = json.load(file)
@@ -57,4 +60,11 @@ if unsafe:
     print(table('unsafe because', judged['reasons']))
     for finding in judged['unsafe'][:20]:
         print('- {time:.6f} s: {kind}, {detail}, `{frame}`'.format(**finding))
+if options.bad_sender:
+    bad = report['bad_frame']
+    with open(options.bad_sender, encoding='utf-8') as file:
+        sent = sum(line.split()[-1] == bad for line in file)
+    found = {f['time'] for f in judged['unsafe'] if f['frame'] == bad and (f['clause'], f['kind']) in (('b', 'rate'), ('a', 'counter'))}
+    print(f'\nThe bad sender sent {sent} frames, {len(found)} were found for the angle or the counter.')
+    sys.exit(0 if sent and len(found) == sent else 1)
 sys.exit(1 if unsafe or not judged['pilot_frames'] else 0)

@@ -17,6 +17,8 @@
 #include <string>
 
 #include "tunnel_pilot/can/embedded_bus.h"
+#include "tunnel_pilot/can/linux_frame.h"
+#include "tunnel_pilot/can/log_writer.h"
 #include "tunnel_pilot/can/memory_bus.h"
 
 namespace tunnel_pilot::can {
@@ -85,6 +87,38 @@ TEST(MemoryBus, ForgetsAParticipantThatLeft) {
   const auto a = hub.connect();
   hub.connect();
   EXPECT_TRUE(a->send(makeFrame(1)));
+}
+
+TEST(MemoryBus, HasNothingToPoll) {
+  MemoryBusHub hub;
+  EXPECT_EQ(hub.connect()->descriptor(), -1);
+}
+
+TEST(LinuxFrame, OfElevenBitsWithALargerIdentifierIsNone) {
+  can_frame frame{};
+  frame.can_id = CAN_SFF_MASK;
+  EXPECT_TRUE(fromLinux(frame));
+  frame.can_id = CAN_SFF_MASK + 1;
+  EXPECT_FALSE(fromLinux(frame));
+  frame.can_id |= CAN_EFF_FLAG;
+  EXPECT_TRUE(fromLinux(frame));
+}
+
+TEST(LogWriter, WritesWhatCandumpWritesWithEventsAmongIt) {
+  std::ostringstream out;
+  LogWriter log(out);
+  log.event("start", fromSeconds(12.5));
+  Frame frame = makeFrame(0x110, 0xAB);
+  log.frame(frame, fromSeconds(12.5000019));
+  frame.id = 0x0CFF1080;
+  frame.extended = true;
+  frame.length = 2;
+  log.frame(frame, fromSeconds(1000.0));
+  EXPECT_EQ(out.str(),
+            "(12.500000) event start\n(12.500001) can0 110#AB00000000000000\n"
+            "(1000.000000) can0 0CFF1080#AB00\n");
+  frame.length = 15;  // which no frame has
+  EXPECT_EQ(toText(frame), "0CFF1080#AB00000000000000");
 }
 
 TEST(EmbeddedBus, CarriesFramesUnchangedToAllOthers) {

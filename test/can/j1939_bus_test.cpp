@@ -218,6 +218,27 @@ TEST_F(J1939BusTest, ARequestForClaimsIsAnsweredToAllAndToItself) {
   EXPECT_TRUE(sent.empty()) << "somebody else is asked";
 }
 
+TEST_F(J1939BusTest, WhatIsNoRequestForClaimsIsNotAnswered) {
+  hold();
+  std::vector<Frame> frames(4, request(kPilot));
+  frames[0].length = 4;
+  frames[1].data[1] = 0xEB;  // another group is asked for
+  frames[2].id = toIdentifier({6, kRequestPgn + 0x100, kPilot, kStranger});  // another group asks
+  frames[3].id = toIdentifier({6, kRequestPgn, kPilot, kPilot});             // in the pilot's own name
+  for (const Frame& frame : frames) wire->send(frame);
+  run(ms(50));
+  EXPECT_TRUE(sent.empty());
+  EXPECT_EQ(received.size(), frames.size());
+}
+
+TEST_F(J1939BusTest, ClaimsOfOtherAddressesAreNobodysBusiness) {
+  hold();
+  wire->send(claimOf(kName - 1, kStranger));
+  run(ms(50));
+  EXPECT_TRUE(sent.empty());
+  EXPECT_TRUE(sendsCommand());
+}
+
 TEST_F(J1939BusTest, TheLoserAnswersARequestWithoutTheAddress) {
   hold();
   wire->send(claimOf(kName - 1));
@@ -296,6 +317,18 @@ TEST_F(J1939BusTest, SendsEachOfItsFramesAsItsGroupWithTheSameBytes) {
     EXPECT_TRUE(sent[0].extended);
     EXPECT_EQ(sent[0].data, frame.data);
   }
+}
+
+TEST_F(J1939BusTest, SendsNothingButItsOwnFrames) {
+  hold();
+  EXPECT_FALSE(bus.send(*encode(TruckFeedbackFrame())));
+  EXPECT_FALSE(bus.send(makeFrame(0x7FF, false)));
+  Frame extended = *encode(TruckCommandFrame());
+  extended.extended = true;
+  EXPECT_FALSE(bus.send(extended));
+  run(ms(5));
+  EXPECT_TRUE(sent.empty());
+  EXPECT_EQ(bus.trouble(), "");
 }
 
 TEST_F(J1939BusTest, GivesThePartnersFramesWhateverTheirPriority) {
@@ -485,6 +518,10 @@ TEST(Profile, ThatDoNotAgreeAreRefused) {
   other.kind = ProfileKind::kJ1939;
   EXPECT_NO_THROW(requireAgreement(other, trucks));
   other.j1939.partner_address = 7;
+  EXPECT_THROW(requireAgreement(other, trucks), config::ConfigError);
+  other = pilots;
+  other.kind = ProfileKind::kJ1939;
+  other.j1939.source_address = 7;
   EXPECT_THROW(requireAgreement(other, trucks), config::ConfigError);
 }
 

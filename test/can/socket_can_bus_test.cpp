@@ -182,6 +182,9 @@ TEST_F(SocketCanBusTest, TellsWarningPassiveAndActiveAgain) {
   kernel.told(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_PASSIVE);
   read();
   EXPECT_EQ(bus().state(), BusState::kPassive);
+  kernel.told(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_OVERFLOW);  // of no state at all
+  read();
+  EXPECT_EQ(bus().state(), BusState::kPassive);
   kernel.told(CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE);
   read();
   EXPECT_EQ(bus().state(), BusState::kActive);
@@ -254,6 +257,37 @@ TEST_F(SocketCanBusTest, AVanishedInterfaceIsOpenedAnewOnceItIsBackAndConfigured
   read();
   EXPECT_EQ(bus().confirmed(), 1u);
   EXPECT_EQ(bus().late(), 0u);
+}
+
+TEST_F(SocketCanBusTest, AVanishedInterfaceOfWhichNetlinkAloneTellsIsClosed) {
+  bus();
+  kernel.link = CanLink();
+  kernel.changes.push_back(kernel.link);
+  read();
+  EXPECT_FALSE(kernel.attached);
+  EXPECT_EQ(bus().state(), BusState::kDown);
+  expectTrouble("no interface can0");
+}
+
+TEST_F(SocketCanBusTest, ACycleOfWhichNetlinkToldNothingCounts) {
+  bus();
+  kernel.stall();
+  bus().send(makeFrame(kOwn));
+  bus().discard();
+  for (int i = 0; i < 10; ++i) {
+    read();
+    kernel.changes.clear();
+  }
+  EXPECT_EQ(bus().state(), BusState::kActive);
+  EXPECT_EQ(bus().inFlight(), 0u);
+}
+
+TEST_F(SocketCanBusTest, AnEchoThatWasNotExpectedIsALateOne) {
+  bus();
+  kernel.transmit(makeFrame(kOwn));
+  read();
+  EXPECT_EQ(bus().late(), 1u);
+  EXPECT_EQ(bus().inFlight(), 0u);
 }
 
 TEST_F(SocketCanBusTest, AWriteToAVanishedInterfaceIsFoundByItsError) {

@@ -127,6 +127,7 @@ class BridgeProcess {
 struct Record {
   std::map<std::string, long> kinds, states, stops;
   long injections = 0, bursts = 0, engaged = 0, late_sets = 0, edges_lost = 0;
+  std::string bad_frame;  ///< the one that the bad sender sends, as it stands in the log
 };
 
 class Campaign {
@@ -710,7 +711,9 @@ class Campaign {
     can::TruckCommandFrame command{};
     command.steering_enable = true;
     command.articulation_angle = 0.5;
-    if (const auto frame = can::encode(command)) bad_wire_->send(*frame);
+    const can::Frame frame = *can::encode(command);
+    bad_wire_->send(frame);
+    record_.bad_frame = can::toText(frame);
   }
 
   void write(double seconds) {
@@ -731,7 +734,8 @@ class Campaign {
     out << "\"injections\": " << record_.injections << ", \"bursts\": " << record_.bursts
         << ", \"engaged\": " << record_.engaged << ", \"late_sets\": " << record_.late_sets
         << ", \"dropped\": " << bus_.dropped() << ", \"contacts\": " << simulator_->truth().contacts
-        << ",\n\"simulated_seconds\": " << toSeconds(simulator_->now()) << ", \"seconds\": " << seconds
+        << ", \"bad_frame\": \"" << record_.bad_frame
+        << "\",\n\"simulated_seconds\": " << toSeconds(simulator_->now()) << ", \"seconds\": " << seconds
         << "\n}\n";
   }
 

@@ -218,6 +218,44 @@ TEST(Envelope, RemembersTheWallsBesideTheTruck) {
   EXPECT_NEAR(check.of(straightScene(0.0)).clearance_left, 2.5 - kHalfTruck, 0.01);
 }
 
+TEST(Envelope, AGapInAWallIsNotBridged) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  std::vector<geometry::Point> curve;
+  for (geometry::Point p : scene.walls.left.curve) {
+    if (p.x() > 5.0 && p.x() < 11.0) continue;
+    if (p.x() >= 11.0) p.y() -= 1.2;  // 1.3 m: in the way of the truck
+    curve.push_back(p);
+  }
+  scene.walls.left.curve = curve;
+  const Envelope::Result& result = check.of(scene);
+  EXPECT_EQ(result.free_until, Envelope::End::kWall);
+  EXPECT_NEAR(result.free_distance, 11.0 - check.truck.front_overhang, 1.0);
+}
+
+TEST(Envelope, AWallThatStepsAsideCountsWithItsNearestPoint) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  scene.tunnel.centerline = geometry::Path();  // the stations stand at whole metres
+  std::vector<geometry::Point> curve;
+  for (int x = 0; x <= 10; ++x) {
+    if (x == 5) curve.emplace_back(5.0, 1.6);
+    curve.emplace_back(x, 2.5);
+  }
+  scene.walls.left.curve = curve;
+  EXPECT_NEAR(check.of(scene).clearance_left, 1.6 - kHalfTruck, 1e-6);
+}
+
+TEST(Envelope, AWallWithoutAPointIsNone) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  scene.walls.left.curve.clear();
+  EXPECT_FALSE(check.of(scene).clearance_left < 10.0);
+  check.odom.x = 2.0;
+  EXPECT_FALSE(check.of(scene).clearance_left < 10.0) << "nothing was remembered of it";
+  EXPECT_NEAR(check.envelope.result().clearance_right, 2.5 - kHalfTruck, 0.01);
+}
+
 TEST(Envelope, TheCorridorIsDrawnFromTailToFront) {
   Check check;
   const Envelope::Result& result = check.of(straightScene(0.0));

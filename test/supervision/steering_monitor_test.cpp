@@ -98,6 +98,19 @@ TEST(SteeringMonitor, ExpectsTheRateThatThePumpHasAtThisSpeed) {
   }
 }
 
+TEST(SteeringMonitor, ThePumpIsAtItsBestFromTheWorkingSpeedOn) {
+  vehicle::HydraulicSteering steering = truck().steering;
+  steering.working_speed = 2.0;
+  steering.dead_time = 0.0;
+  for (const auto& [speed, share] : {std::pair{0.5, 0.25}, {1.0, 0.5}, {2.0, 1.0}, {4.0, 1.0}}) {
+    SteeringMonitor monitor(steering, kTolerance, kTime);
+    monitor.start(0.0, Stamp(0));
+    monitor.update(0.7, 0.0, speed, fromSeconds(kCycle));
+    const double rate = steering.idle_rate + share * (steering.max_rate - steering.idle_rate);
+    EXPECT_NEAR(monitor.expected(), rate * kCycle, 1e-12) << speed;
+  }
+}
+
 TEST(SteeringMonitor, ExpectsASmallAngleToComeWithTheLag) {
   SteeringMonitor monitor = started();
   for (int i = 1; i <= 20; ++i) {

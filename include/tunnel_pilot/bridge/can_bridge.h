@@ -124,11 +124,13 @@ class CanBridge {
   void watchSteering(Stamp now);
   void raise(Event event, Stamp now);
   void raise(Event event, Stamp now, supervision::Reason carried);
+  std::string inWords(Event fault) const;
   std::optional<std::string> whyUnhealthy(Stamp now) const;
 
   bool standsStill(Stamp now) const;
   bool commandUsable(Stamp now) const;
   bool steeringEnabled(Stamp now) const;
+  bool tooOldOnTheBus(Stamp now) const;
   bool stopBit(Stamp now) const;
   double limitedAngle(double wanted, bool steering, Stamp now);
   double widestAngle() const;
@@ -159,7 +161,7 @@ class CanBridge {
   std::optional<Stamp> link_healthy_since_;
   std::optional<Stamp> healthy_since_;  ///< all inputs
   std::optional<Stamp> undegraded_since_;
-  std::optional<Stamp> obeyed_;  ///< when the truck last told that it obeys
+  Stamp obeyed_{};  ///< when the truck last told that it obeys, or was first asked to
   std::optional<Stamp> standing_since_;
   std::optional<double> held_angle_;  ///< of a stop without a usable command [rad]
   double sent_angle_ = 0.0;           ///< [rad]

@@ -55,6 +55,7 @@ class Pilot {
 
   bridge::CanBridge::Answer engage(Stamp now) { return bridge_.engage(now); }
 
+  bridge::CanBridge& bridge() { return bridge_; }  ///< the operator's edges, heartbeats
   const bridge::CanBridge& bridge() const { return bridge_; }
   const supervision::Decision& decision() const { return decision_; }
   const perception::Tunnel& tunnel() const { return tunnel_; }

@@ -94,6 +94,7 @@ class Simulator {
   geometry::Pose poseOnLine(double station, double lateral_offset, double heading_error) const;
 
   TruckController& controller() { return controller_; }
+  const TruckController& controller() const { return controller_; }
 
   /// While set, the plant obeys this instead of the truck's controller (somebody else drives).
   void lead(std::optional<vehicle::PlantInput> input) { lead_ = input; }
