@@ -6,12 +6,6 @@
 #include "tunnel_pilot/drivers/path_cursor.h"
 
 namespace tunnel_pilot::drivers {
-namespace {
-
-// A sweep whose corrections do not help even at this share is not followed.
-constexpr double kLeastCorrection = 0.2;
-
-}  // namespace
 
 struct PreviewPlanner::Linear {
   Eigen::Matrix4d state;  ///< d(next)/d(state)
@@ -22,6 +16,14 @@ PreviewPlanner::PreviewPlanner(const TruckResponse& truck, const PreviewWeights&
     : truck_(truck), weights_(weights), step_(step), share_(lagShare(step, truck.lag)) {}
 
 void PreviewPlanner::reset() { rates_.fill(0.0); }
+
+void PreviewPlanner::resetToUnwinding(double command, double speed) {
+  for (std::size_t k = 0; k < kStages; ++k) {
+    const double limit = rateLimit(k, speed);
+    rates_[k] = std::clamp(-command / step_, -limit, limit);
+    command += step_ * rates_[k];
+  }
+}
 
 PathState PreviewPlanner::advance(const PathState& now, double cos_heading_error, double command_rate,
                                   double speed, double curvature, const YawResponse& believed) const {
@@ -175,13 +177,14 @@ double PreviewPlanner::plan(const PathState& now, const geometry::Path& path, do
   nominal_ = states_;
   nominal_rates_ = rates_;
   cost_ = before;
-  for (double correction = 1.0; correction > kLeastCorrection; correction *= 0.5) {
+  for (double correction = 1.0; correction >= least_correction_; correction *= 0.5) {
     const double after = roll(now, path, speed, believed, correction);
     if (!(after <= before)) continue;
     cost_ = after;
     return rates_[0];
   }
-  rates_ = nominal_rates_;  // no better plan was found, or something is not finite
+  states_ = nominal_;  // no better plan was found, or something is not finite
+  rates_ = nominal_rates_;
   if (!std::isfinite(before)) reset();
   return rates_[0];
 }

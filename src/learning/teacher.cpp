@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "tunnel_pilot/drivers/path_cursor.h"
 #include "tunnel_pilot/drivers/path_model.h"
@@ -9,8 +10,10 @@
 namespace tunnel_pilot::learning {
 namespace {
 
-constexpr int kSweeps = 8;
-constexpr double kMoveStep = 0.02;  // [s]
+constexpr int kMostSweeps = 40;
+constexpr double kSettled = 1e-7;  // [1] of the cost that a sweep saves, then the plan is settled
+constexpr double kLeastCorrection = 0.004;  // [1] a start is far from the optimum
+constexpr double kMoveStep = 0.02;          // [s]
 
 drivers::TruckResponse response(const drivers::PreviewDriverParameters& p,
                                 const vehicle::TruckGeometry& geometry) {
@@ -24,7 +27,9 @@ drivers::TruckResponse response(const drivers::PreviewDriverParameters& p,
 Teacher::Teacher(const drivers::PreviewDriverParameters& parameters, const vehicle::TruckGeometry& truck)
     : parameters_(parameters),
       response_(response(parameters, truck)),
-      planner_(response_, parameters.weights, parameters.step) {}
+      planner_(response_, parameters.weights, parameters.step) {
+  planner_.setLeastCorrection(kLeastCorrection);
+}
 
 void Teacher::setMaxRate(double rate) {
   response_.max_rate = rate;
@@ -38,8 +43,23 @@ double Teacher::command(const geometry::Path& line, const TruckBesideLine& truck
                                  std::clamp(demand, -parameters_.truck.steering.max_articulation,
                                             parameters_.truck.steering.max_articulation)};
   const double speed = std::max(truck.speed, parameters_.planning_speed);
+  // From one start alone, one plan in some thirty ends in a local optimum.
   planner_.reset();
-  for (int i = 0; i < kSweeps; ++i) planner_.plan(start, line, speed, believed, 0.0);
+  const double demand_standing = settled(start, line, speed, believed);
+  const double cost_standing = planner_.cost();
+  planner_.resetToUnwinding(start.command, speed);
+  const double demand_unwinding = settled(start, line, speed, believed);
+  return planner_.cost() < cost_standing ? demand_unwinding : demand_standing;
+}
+
+double Teacher::settled(const drivers::PathState& start, const geometry::Path& line, double speed,
+                        const drivers::YawResponse& believed) {
+  double before = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < kMostSweeps; ++i) {
+    planner_.plan(start, line, speed, believed, 0.0);
+    if (!(planner_.cost() < before * (1.0 - kSettled))) break;
+    before = planner_.cost();
+  }
   return planner_.plannedAt(parameters_.truck.steering.lag).command;
 }
 

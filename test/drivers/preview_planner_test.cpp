@@ -106,6 +106,35 @@ TEST(PreviewPlanner, NeverMakesThePlanWorse) {
   EXPECT_LT(last, 0.95 * first);
 }
 
+// Turned far already on its way back to a path 1.6 m aside: a plan from a standing command is far from
+// the optimum.
+constexpr PathState kFarAside{5.0, -1.6, -0.09, 0.33, 0.40};
+
+PreviewPlanner sharpPlanner() {
+  return {{geometryOfTruck(), 0.26, kMaxRate, 0.75, 0.02}, {48.0, 2.0, 10.0, 3.0, 5.0, 0.8, 3.0}, kStep};
+}
+
+TEST(PreviewPlanner, TellsThePlanThatItKeeps) {
+  PreviewPlanner p = sharpPlanner();
+  p.setLeastCorrection(1.0);  // most sweeps are refused
+  double rate = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    rate = p.plan(kFarAside, straight(), 2.0, {0.95, 0.0}, 0.0);
+    EXPECT_NEAR(p.plannedAt(kStep).command, kFarAside.command + kStep * rate, 1e-9);
+  }
+}
+
+TEST(PreviewPlanner, ComesToTheSamePlanFromTwoStartsWhereSmallCorrectionsAreTried) {
+  PreviewPlanner p = sharpPlanner();
+  p.setLeastCorrection(0.004);
+  const double standing = planned(p, kFarAside, straight(), 2.0);
+  const double cost = p.cost();
+  p.resetToUnwinding(kFarAside.command, 2.0);
+  EXPECT_NEAR(planned(p, kFarAside, straight(), 2.0), standing, 1e-3);
+  EXPECT_NEAR(p.cost(), cost, 1e-3 * cost);
+  EXPECT_GT(standing, 0.9 * kMaxRate);  // it must turn on
+}
+
 TEST(PreviewPlanner, RecoversFromAStateThatIsNotANumber) {
   PreviewPlanner p = planner();
   p.plan({5.0, std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0, 0.0}, straight(), 3.0, {}, 0.03);

@@ -101,6 +101,25 @@ TEST(Teacher, ATruckThatTurnsLessIsDemandedMore) {
   EXPECT_GT(t.command(lineOf(0.04), truck, {0.8, 0.0}), usual + 0.005);
 }
 
+// A plan that has not settled lets go in the middle of such a turn.
+TEST(Teacher, TurnsATruckThatHeadsAwayWithoutAPause) {
+  simulation::Setup s = setup();
+  s.pilot.preview_driver.weights = loadRecipe(kSource + "/recipes/lidar_driver.yaml").teacher;
+  Teacher t(s.pilot.preview_driver, s.truck.geometry);
+  TruckBesideLine truck = truckAt(-0.737, -0.366519);
+  truck.speed = 2.0;
+  const double moment = 0.05;  // [s]
+  double time = 0.0;
+  for (; truck.heading_error < 0.0 && time < 4.0; time += moment) {
+    const double demand = t.command(lineOf(0.0), truck, {});
+    if (time > 0.3) {
+      EXPECT_GT(demand - truck.articulation, 0.06) << "after " << time << " s";
+    }
+    truck = t.steered(lineOf(0.0), truck, {}, demand, moment);
+  }
+  EXPECT_LT(time, 2.0);
+}
+
 TEST(Teacher, MovesATruckAlongTheLineAtItsSpeed) {
   const TruckBesideLine moved = teacher().movedOn(lineOf(0.0), truckAt(0.1, 0.0), {}, 0.5);
   EXPECT_NEAR(moved.station, 21.5, 1e-3);

@@ -47,9 +47,13 @@ class PreviewPlanner {
   /// speed [m/s] is held over the horizon. The path must not be empty.
   double plan(const PathState& now, const geometry::Path& path, double speed,
               const YawResponse& believed, double elapsed);
-  void reset();
+  void reset();  ///< the next plan starts from a standing command ...
+  void resetToUnwinding(double command, double speed);  ///< ... from one that goes to zero
 
   void setMaxRate(double rate) { truck_.max_rate = rate; }  ///< for the plans to come [rad/s]
+  /// The least share of a sweep's corrections that is tried [1]. A start far from the optimum needs less
+  /// than one from the last plan.
+  void setLeastCorrection(double share) { least_correction_ = share; }
 
   double cost() const { return cost_; }  ///< of the last plan
   /// The planned state `time` [s] after the last plan's start, interpolated; clamped to the horizon.
@@ -91,6 +95,7 @@ class PreviewPlanner {
   PreviewWeights weights_;
   double step_;  ///< [s]
   double cost_ = 0.0;
+  double least_correction_ = 0.25;
   double share_;  ///< of the way to the command that the articulation goes in one step [1]
   std::array<double, kStages> rates_{};       ///< the plan [rad/s]
   std::array<double, kStages> curvatures_{};  ///< met on the way [1/m]

@@ -20,8 +20,9 @@ struct TruckBesideLine {
 };
 
 /// The better teacher: knows the design line and the truck's true state, and plans the optimal way on
-/// (PreviewPlanner) until the plan no longer changes. Its answer for a truck is the articulation that a
-/// driver should demand when its demand begins to act on that truck.
+/// (PreviewPlanner) until the plan no longer changes, from two starts, of which the cheaper end counts.
+/// Its answer for a truck is the articulation that a driver should demand when its demand begins to act
+/// on that truck.
 class Teacher {
  public:
   Teacher(const drivers::PreviewDriverParameters& parameters, const vehicle::TruckGeometry& truck);
@@ -42,6 +43,9 @@ class Teacher {
                           const drivers::YawResponse& believed, double command, double time) const;
 
  private:
+  /// The demand of the plan that the planner's start comes to [rad].
+  double settled(const drivers::PathState& start, const geometry::Path& line, double speed,
+                 const drivers::YawResponse& believed);
   TruckBesideLine moved(const geometry::Path& line, const TruckBesideLine& truck,
                         const drivers::YawResponse& believed, double time,
                         const std::optional<double>& command) const;
