@@ -5,8 +5,6 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # Another python3 before /usr/bin would hide the distribution's ROS modules.
 export PATH="/usr/bin:/bin:/usr/sbin:/sbin:$PATH"
 export PYTHONNOUSERSITE=1
-# The same objects for whoever compiles in whichever clone.
-export CCACHE_BASEDIR="$PWD" CCACHE_NOHASHDIR=1
 unset PYTHONPATH PYTHONHOME || true
 
 say() { printf '\n== %s\n' "$*" >&2; }
@@ -59,7 +57,6 @@ limited() {
 interrupted() {
   trap '' INT TERM HUP
   stop_telling
-  end_early_build
   if [ -n "$running" ]; then
     kill -INT -- "-$running" 2>/dev/null || true
     wait "$running" || true
@@ -86,20 +83,14 @@ stop_telling() {
   teller=
 }
 
-# Those of the packages named in the given list files that are missing: dpkg does not know them as installed.
-missing_packages() {
-  local wanted
-  mapfile -t wanted < <(grep -hv '^#' "$@")
-  comm -23 <(printf '%s\n' "${wanted[@]}" | sort -u) \
-    <(dpkg-query -W -f '${db:Status-Status} ${Package}\n' "${wanted[@]}" 2>/dev/null |
-      sed -n 's/^installed //p' | sort -u)
-}
-
-# Installs those of them.
-lists_are_new=
+# Installs those of the packages named in the given list files that are missing.
 install_packages() {
-  local missing sudo=() log output="" status=0
-  mapfile -t missing < <(missing_packages "$@")
+  local wanted missing sudo=() log output="" status=0
+  mapfile -t wanted < <(grep -hv '^#' "$@")
+  # Status and name of those that dpkg knows; what is not installed is missing.
+  mapfile -t missing < <(comm -23 <(printf '%s\n' "${wanted[@]}" | sort -u) \
+    <(dpkg-query -W -f '${db:Status-Status} ${Package}\n' "${wanted[@]}" 2>/dev/null |
+      sed -n 's/^installed //p' | sort -u))
   [ ${#missing[@]} -eq 0 ] && return 0
   if ! command -v apt-get >/dev/null; then
     echo "no apt-get here to install: ${missing[*]}" >&2
@@ -114,12 +105,9 @@ install_packages() {
   say "installing ${#missing[@]} packages and what they need; the first time some minutes (log: $log)"
   output=$log
   tell_time installing
-  {
-    if [ -z "$lists_are_new" ]; then
-      limited 600 "${sudo[@]}" apt-get update -o APT::Update::Error-Mode=any && lists_are_new=yes
-    fi && limited 7200 "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive \
-      apt-get install -y --no-install-recommends "${missing[@]}"
-  } || status=$?
+  { limited 600 "${sudo[@]}" apt-get update -o APT::Update::Error-Mode=any &&
+    limited 7200 "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive \
+      apt-get install -y --no-install-recommends "${missing[@]}"; } || status=$?
   stop_telling
   if [ "$status" -ne 0 ]; then
     tail -n 20 "$log" >&2
@@ -127,39 +115,6 @@ install_packages() {
     return 1
   fi
   rm -f "$log" build*/configured  # what was looked for in vain may be there now
-}
-
-# Compiles what needs neither ROS nor PCL nor OpenCV, in the background: their installation takes minutes and leaves
-# a processor free. Its compilations are found in ccache later; what goes wrong, the build proper tells.
-early=
-idly() { chrt --idle 0 "$@"; }  # only the time that the installation leaves
-start_early_build() {
-  mkdir -p build
-  set -m
-  {
-    flock 8
-    idly cmake -S . -B build -DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DTUNNEL_PILOT_EARLY=ON "${build_options[@]}" &&
-      idly cmake --build build -j "$(nproc)"
-  } 8<build </dev/null >build/early.log 2>&1 &
-  early=$!
-  set +m
-}
-end_early_build() {
-  [ -n "$early" ] || return 0
-  kill -- "-$early" 2>/dev/null || true
-  wait "$early" || true
-  early=
-}
-
-# Installs what the given lists name and begins to build meanwhile, where nothing was built yet.
-prepare() {
-  if [ -n "$(missing_packages "$@")" ] && [ ! -e build/Makefile ]; then
-    install_packages scripts/early_packages.txt
-    start_early_build
-  fi
-  install_packages "$@" && return 0
-  end_early_build
-  return 1
 }
 
 # Configures a build folder, unless it was so already: what changes in the sources since, make sees itself.
@@ -192,6 +147,7 @@ build_in() {
   exec 8<"$folder"  # two makes in one folder would spoil each other's files
   flock --nonblock 8 || { say "waiting for another build in $folder"; output="" limited 10800 flock 8; }
   say "building; the first time some minutes (log: $log)"
+  export CCACHE_BASEDIR="$PWD" CCACHE_NOHASHDIR=1
   tell_time building
   : >"$log"
   { configure "$folder" "${options[@]}" && make_in "$folder" "$@"; } || status=$?
@@ -205,15 +161,10 @@ build_in() {
 
 # Builds into build/ and devel/ what is asked for (nothing: all but the tests). The devel space stands outside
 # build/, where rosrun does not look for programs.
-build_options=(-DTUNNEL_PILOT_WERROR=ON -DTUNNEL_PILOT_UNITY=ON "-DCATKIN_DEVEL_PREFIX=$PWD/devel")
 build() {
   rm -rf build/devel  # of a build folder that was configured before this was so
   [ -f devel/setup.bash ] || rm -f build/configured
-  if [ -n "$early" ]; then
-    wait "$early" || true
-    early=
-  fi
-  build_in build -DTUNNEL_PILOT_EARLY=OFF "${build_options[@]}" -- "$@"
+  build_in build -DTUNNEL_PILOT_WERROR=ON -DTUNNEL_PILOT_UNITY=ON "-DCATKIN_DEVEL_PREFIX=$PWD/devel" -- "$@"
 }
 
 # Makes the built package known to roslaunch and its friends.
