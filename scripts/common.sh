@@ -117,21 +117,23 @@ install_packages() {
   rm -f "$log" build*/configured  # what was looked for in vain may be there now
 }
 
-# Configures a build folder, unless it was so already: what changes in the sources since, make sees itself.
+# Configures a build folder, unless it was so already: what changes in the sources since, the build sees itself.
+# Ninja compiles a target's sources while the libraries it links are still being made; make waits.
 configure() {
   local folder=$1
   shift
   local wanted="$PWD $*" stamp=$folder/configured
-  if [ -f "$folder/Makefile" ] && [ "$(cat "$stamp" 2>/dev/null)" = "$wanted" ]; then return 0; fi
+  if [ -f "$folder/build.ninja" ] && [ "$(cat "$stamp" 2>/dev/null)" = "$wanted" ]; then return 0; fi
   rm -f "$stamp"
+  rm -rf "$folder"/{CMakeCache.txt,CMakeFiles,Makefile}  # a folder once configured for make stays so otherwise
   # Messages for C++ and Python alone: nothing here speaks the others.
-  ROS_LANG_DISABLE=genlisp:geneus:gennodejs limited 600 cmake -S . -B "$folder" \
+  ROS_LANG_DISABLE=genlisp:geneus:gennodejs limited 600 cmake -G Ninja -S . -B "$folder" \
     -DCMAKE_CXX_COMPILER_LAUNCHER=ccache "$@" || return
   printf '%s\n' "$wanted" >"$stamp"
 }
 
-# Builds with make what is asked for in a configured folder.
-make_in() {
+# Builds what is asked for in a configured folder.
+build_targets() {
   local folder=$1
   shift
   limited 10800 cmake --build "$folder" -j "$(nproc)" -- "$@"
@@ -144,13 +146,13 @@ build_in() {
   while [ "$1" != -- ]; do options+=("$1"); shift; done
   shift
   mkdir -p "$folder"
-  exec 8<"$folder"  # two makes in one folder would spoil each other's files
+  exec 8<"$folder"  # two builds in one folder would spoil each other's files
   flock --nonblock 8 || { say "waiting for another build in $folder"; output="" limited 10800 flock 8; }
   say "building; the first time some minutes (log: $log)"
   export CCACHE_BASEDIR="$PWD" CCACHE_NOHASHDIR=1
   tell_time building
   : >"$log"
-  { configure "$folder" "${options[@]}" && make_in "$folder" "$@"; } || status=$?
+  { configure "$folder" "${options[@]}" && build_targets "$folder" "$@"; } || status=$?
   stop_telling
   exec 8<&-
   [ "$status" -eq 0 ] && return 0
