@@ -17,8 +17,9 @@ TruckBesideLine between(const TruckBesideLine& a, const TruckBesideLine& b, doub
 
 }  // namespace
 
-DriveCollector::DriveCollector(const simulation::Setup& setup, std::uint32_t tunnel)
-    : teacher_(setup.pilot.preview_driver, setup.truck.geometry),
+DriveCollector::DriveCollector(const simulation::Setup& setup, const TeacherParameters& teacher,
+                               std::uint32_t tunnel)
+    : teacher_(teacher, setup.pilot.preview_driver, setup.truck.geometry),
       delay_(fromSeconds(setup.pilot.preview_driver.truck.steering.transport_delay +
                          setup.pilot.preview_driver.truck.steering.dead_time)),
       tunnel_(tunnel) {}

@@ -39,7 +39,6 @@ class Cook {
         setup_(simulation::loadSetup(simulation::loadScenario(recipe.base_scenario))),
         file_(makeNetwork(recipe.design, recipe.name)) {
     file_.network.randomise(recipe.seed);
-    setup_.pilot.preview_driver.weights = recipe.teacher;
     setup_.pilot.driver = simulation::DriverChoice::kLidarDriver;
     // An unsure beginner shall go on, to be shown better.
     for (supervision::SourceRule& rule : setup_.pilot.arbiter.sources) rule.min_confidence = 0.0;
@@ -94,7 +93,8 @@ class Cook {
       std::vector<DataSet> sets(all);
       inParallel(all, jobs_, [&](std::size_t i) {
         const std::uint64_t seed = recipe_.seed + kSeedsOfASource * s + i;
-        sets[i] = sampleScenes(source.world_file, seed, source.examples, setup_, source.spread);
+        sets[i] = sampleScenes(source.world_file, seed, source.examples, setup_, recipe_.teacher,
+                               source.spread);
       });
       for (std::size_t i = 0; i < all; ++i) {
         moveInto(i < static_cast<std::size_t>(source.tunnels) ? examples_ : held_out_,
@@ -128,7 +128,7 @@ class Cook {
     const std::vector<simulation::EpisodePlan> plans = simulation::episodePlans(seeded, source.tunnels);
     std::vector<DataSet> sets(plans.size());
     inParallel(plans.size(), jobs_, [&](std::size_t i) {
-      DriveCollector collector(setup_, static_cast<std::uint32_t>(plans[i].seed));
+      DriveCollector collector(setup_, recipe_.teacher, static_cast<std::uint32_t>(plans[i].seed));
       simulation::runEpisode(varied(scenario, source, plans[i].seed), setup_, plans[i], &collector);
       sets[i] = collector.take();
     });

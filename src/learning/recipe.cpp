@@ -102,7 +102,7 @@ Recipe loadRecipe(const std::string& file) {
   recipe.base_scenario = beside(node, "scenario", base);
   recipe.seed = static_cast<std::uint64_t>(node.integer("seed", "1", 0, 1'000'000'000));
   recipe.design = loadDesign(node.child("network"));
-  recipe.teacher = drivers::loadPreviewWeights(node.child("teacher"));
+  recipe.teacher = loadTeacher(node.child("teacher"));
   for (config::Node& source : node.children("scenes")) {
     recipe.scenes.push_back(loadScenes(std::move(source), base));
   }

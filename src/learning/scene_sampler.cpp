@@ -31,7 +31,7 @@ double spreadOut(Random& random, double largest) {
 class Sampler {
  public:
   Sampler(const std::string& world_file, std::uint64_t seed, const simulation::Setup& setup,
-          const SceneSpread& spread)
+          const TeacherParameters& teacher, const SceneSpread& spread)
       : setup_(setup),
         spread_(spread),
         truck_(setup.truck.geometry),
@@ -41,7 +41,7 @@ class Sampler {
         caster_(world_.walls, simulation::LidarModel::beams(setup.simulator.lidar)),
         lidar_(setup.simulator.lidar, seed),
         filter_(setup.pilot.perception.scan_filter),
-        teacher_(setup.pilot.preview_driver, truck_),
+        teacher_(teacher, setup.pilot.preview_driver, truck_),
         governor_(setup.pilot.arbiter.governor),
         articulation_(setup.simulator.articulation, seed, Stream::kArticulation),
         speed_(setup.simulator.speed, seed, Stream::kSpeed),
@@ -152,8 +152,9 @@ class Sampler {
 }  // namespace
 
 DataSet sampleScenes(const std::string& world_file, std::uint64_t seed, std::size_t count,
-                     const simulation::Setup& setup, const SceneSpread& spread) {
-  return Sampler(world_file, seed, setup, spread).run(count);
+                     const simulation::Setup& setup, const TeacherParameters& teacher,
+                     const SceneSpread& spread) {
+  return Sampler(world_file, seed, setup, teacher, spread).run(count);
 }
 
 }  // namespace tunnel_pilot::learning

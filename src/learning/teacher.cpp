@@ -24,10 +24,20 @@ drivers::TruckResponse response(const drivers::PreviewDriverParameters& p,
 
 }  // namespace
 
-Teacher::Teacher(const drivers::PreviewDriverParameters& parameters, const vehicle::TruckGeometry& truck)
-    : parameters_(parameters),
-      response_(response(parameters, truck)),
-      planner_(response_, parameters.weights, parameters.step) {
+TeacherParameters loadTeacher(config::Node node) {
+  TeacherParameters parameters;
+  parameters.beyond = node.number("beyond", "m", 0.0, 0.5);
+  parameters.weights = drivers::loadPreviewWeights(node.child("weights"));
+  node.finish();
+  return parameters;
+}
+
+Teacher::Teacher(const TeacherParameters& judgement, const drivers::PreviewDriverParameters& driver,
+                 const vehicle::TruckGeometry& truck)
+    : judgement_(judgement),
+      parameters_(driver),
+      response_(response(driver, truck)),
+      planner_(response_, judgement.weights, driver.step) {
   planner_.setLeastCorrection(kLeastCorrection);
 }
 
@@ -39,7 +49,9 @@ void Teacher::setMaxRate(double rate) {
 double Teacher::command(const geometry::Path& line, const TruckBesideLine& truck,
                         const drivers::YawResponse& believed) {
   const double demand = truck.articulation + parameters_.truck.steering.lag * truck.articulation_rate;
-  const drivers::PathState start{truck.station, truck.offset, truck.heading_error, truck.articulation,
+  const double far = std::clamp((std::abs(truck.offset) - kNear) / (kFar - kNear), 0.0, 1.0);
+  const double offset = truck.offset + std::copysign(judgement_.beyond * far, truck.offset);
+  const drivers::PathState start{truck.station, offset, truck.heading_error, truck.articulation,
                                  std::clamp(demand, -parameters_.truck.steering.max_articulation,
                                             parameters_.truck.steering.max_articulation)};
   const double speed = std::max(truck.speed, parameters_.planning_speed);

@@ -112,14 +112,22 @@ struct Memory {
   double heap;
 };
 
+/// What is handed out of the heap [bytes].
+double heapInUse() {
+#if __GLIBC_PREREQ(2, 33)
+  const struct mallinfo2 heap = mallinfo2();
+#else  // its numbers turn over at 2 GiB, of which the pilot needs a hundredth
+  const struct mallinfo heap = mallinfo();
+#endif
+  return static_cast<double>(heap.uordblks) + static_cast<double>(heap.hblkhd);
+}
+
 Memory readMemory(double hour) {
   std::ifstream file("/proc/self/statm");
   double total = 0.0, resident = 0.0;  // [pages]
   if (!(file >> total >> resident)) throw std::runtime_error("cannot read /proc/self/statm");
   constexpr double kMiB = 1024.0 * 1024.0;
-  const struct mallinfo2 heap = mallinfo2();
-  return {hour, resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / kMiB,
-          static_cast<double>(heap.uordblks + heap.hblkhd) / kMiB};
+  return {hour, resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / kMiB, heapInUse() / kMiB};
 }
 
 /// By least squares, of what was measured after the warm-up [MiB/h]; none of less than four hours more.

@@ -24,9 +24,13 @@ simulation::Setup setup() {
   return simulation::loadSetup(simulation::loadScenario(kSource + "/scenarios/unseen_drifts.yaml"));
 }
 
-Teacher teacher() {
+TeacherParameters judgement(double beyond = 0.0) {
+  return {setup().pilot.preview_driver.weights, beyond};
+}
+
+Teacher teacher(double beyond = 0.0) {
   const simulation::Setup s = setup();
-  return {s.pilot.preview_driver, s.truck.geometry};
+  return {judgement(beyond), s.pilot.preview_driver, s.truck.geometry};
 }
 
 TruckBesideLine truckAt(double offset, double heading_error) {
@@ -86,8 +90,19 @@ TEST(Teacher, LeftOfTheLineDemandsARightTurn) {
   EXPECT_LT(teacher().command(lineOf(0.0), truckAt(0.4, 0.0), {}), -0.01);
 }
 
+// As onto a line 0.06 m on the other side.
+TEST(Teacher, LeadsWhatIsFarFromTheLineAcrossIt) {
+  const double onto = teacher().command(lineOf(0.0), truckAt(0.46, 0.0), {});
+  EXPECT_NEAR(teacher(0.06).command(lineOf(0.0), truckAt(0.40, 0.0), {}), onto, 1e-9);
+}
+
+TEST(Teacher, LeadsWhatIsNearOntoTheLine) {
+  const double onto = teacher().command(lineOf(0.0), truckAt(0.05, 0.0), {});
+  EXPECT_NEAR(teacher(0.06).command(lineOf(0.0), truckAt(0.05, 0.0), {}), onto, 1e-12);
+}
+
 TEST(Teacher, InTheMirrorDemandsTheOpposite) {
-  Teacher t = teacher();
+  Teacher t = teacher(0.06);
   const double left = t.command(lineOf(0.04), truckAt(0.3, -0.1), {});
   const double right = t.command(lineOf(-0.04), truckAt(-0.3, 0.1), {});
   EXPECT_NEAR(left, -right, 1e-6);
@@ -103,9 +118,9 @@ TEST(Teacher, ATruckThatTurnsLessIsDemandedMore) {
 
 // A plan that has not settled lets go in the middle of such a turn.
 TEST(Teacher, TurnsATruckThatHeadsAwayWithoutAPause) {
-  simulation::Setup s = setup();
-  s.pilot.preview_driver.weights = loadRecipe(kSource + "/recipes/lidar_driver.yaml").teacher;
-  Teacher t(s.pilot.preview_driver, s.truck.geometry);
+  const simulation::Setup s = setup();
+  Teacher t(loadRecipe(kSource + "/recipes/lidar_driver.yaml").teacher, s.pilot.preview_driver,
+            s.truck.geometry);
   TruckBesideLine truck = truckAt(-0.737, -0.366519);
   truck.speed = 2.0;
   const double moment = 0.05;  // [s]
@@ -244,8 +259,8 @@ TEST(NetworkTrainer, NeedsExamplesAndOthersHeldOut) {
 TEST(SceneSampler, GivesTheSameScenesTwice) {
   const simulation::Setup s = setup();
   const std::string world = kSource + "/worlds/random_drift.yaml";
-  const DataSet a = sampleScenes(world, 1001, 40, s, {});
-  const DataSet b = sampleScenes(world, 1001, 40, s, {});
+  const DataSet a = sampleScenes(world, 1001, 40, s, judgement(), {});
+  const DataSet b = sampleScenes(world, 1001, 40, s, judgement(), {});
   ASSERT_EQ(a.size(), 40U);
   for (std::size_t i = 0; i < a.size(); ++i) {
     EXPECT_EQ(a[i].label, b[i].label);
@@ -257,7 +272,7 @@ TEST(SceneSampler, DrivesWithinWhatTheGovernorAllows) {
   SceneSpread fast;
   fast.speed_min = fast.speed_max = 9.0;
   for (const Example& example :
-       sampleScenes(kSource + "/worlds/random_drift.yaml", 1002, 60, setup(), fast)) {
+       sampleScenes(kSource + "/worlds/random_drift.yaml", 1002, 60, setup(), judgement(), fast)) {
     EXPECT_LT(example.speed, 7.2F);
   }
 }
@@ -340,7 +355,7 @@ TEST(Recipe, ASmallOneTeachesTheNetworkToSteerBack) {
   neural::Inference inference(network.network);
   std::vector<float> outputs(31);
   for (const Example& example : sampleScenes(kSource + "/worlds/random_drift.yaml", 1003, 200, setup(),
-                                             recipe.scenes[0].spread)) {
+                                             judgement(), recipe.scenes[0].spread)) {
     ASSERT_TRUE(inputs.fill(example.ranges, truckInputsOf(example), values.data()));
     inference.run(values.data(), outputs.data());
     const double error =

@@ -15,7 +15,7 @@ namespace tunnel_pilot::learning {
 /// 2011).
 class DriveCollector : public simulation::DriveObserver {
  public:
-  DriveCollector(const simulation::Setup& setup, std::uint32_t tunnel);
+  DriveCollector(const simulation::Setup& setup, const TeacherParameters& teacher, std::uint32_t tunnel);
 
   void afterScan(const simulation::Simulator& simulator, const simulation::Pilot& pilot) override;
   void afterTruth(const simulation::Simulator& simulator) override;

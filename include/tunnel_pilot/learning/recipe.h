@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "tunnel_pilot/config/node.h"
-#include "tunnel_pilot/drivers/preview_planner.h"
 #include "tunnel_pilot/learning/data_set.h"
 #include "tunnel_pilot/learning/network_trainer.h"
 #include "tunnel_pilot/learning/scene_sampler.h"
+#include "tunnel_pilot/learning/teacher.h"
 #include "tunnel_pilot/neural/network_file.h"
 
 namespace tunnel_pilot::learning {
@@ -55,7 +55,7 @@ struct Recipe {
   std::string base_scenario;  ///< its plant and parameters are those of the scenes
   std::uint64_t seed;
   NetworkDesign design;
-  drivers::PreviewWeights teacher;
+  TeacherParameters teacher;
   std::vector<SceneSource> scenes;
   std::vector<DriveSource> drives;
   int rounds;                ///< of drives: training follows each

@@ -28,6 +28,7 @@ struct SceneSpread {
 /// Scans from places where no drive would come by itself, beside the demand that leads back: Pomerleau's
 /// shifts and turns, with real scans instead of distorted ones, since the world is simulated.
 DataSet sampleScenes(const std::string& world_file, std::uint64_t seed, std::size_t count,
-                     const simulation::Setup& setup, const SceneSpread& spread);
+                     const simulation::Setup& setup, const TeacherParameters& teacher,
+                     const SceneSpread& spread);
 
 }  // namespace tunnel_pilot::learning
