@@ -39,13 +39,13 @@ void AddressClaim::tick(Stamp now, bool on_its_way) {
 }
 
 std::optional<Frame> AddressClaim::due() const {
+  if (time_ - sent_at_ < kSpacing) return std::nullopt;
   if (state_ == State::kUnclaimed) return claimFrame(address_, name_);
   if (!answer_) return std::nullopt;
   if (state_ == State::kLost) {
     if (time_ - since_ < shyness()) return std::nullopt;
     return claimFrame(kNullAddress, name_);
   }
-  if (time_ - sent_at_ < kSpacing) return std::nullopt;
   return claimFrame(address_, name_);
 }
 

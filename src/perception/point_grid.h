@@ -47,8 +47,13 @@ class PointGrid {
   static constexpr float kFirstY = -32.0F;  // [m]
 
   // Cells count from one, so that truncation puts all that lies before the grid into column or row 0.
-  static int column(float x) { return static_cast<int>(std::max(x - kFirstX, -kCell) / kCell + 1.0F); }
-  static int row(float y) { return static_cast<int>(std::max(y - kFirstY, -kCell) / kCell + 1.0F); }
+  // What lies behind it counts as its end: a place may be farther off than an int can count.
+  static int cell(float from_first, int size) {
+    return static_cast<int>(
+        std::min(std::max(-kCell, from_first) / kCell + 1.0F, static_cast<float>(size)));
+  }
+  static int column(float x) { return cell(x - kFirstX, kSizeX); }
+  static int row(float y) { return cell(y - kFirstY, kSizeY); }
 
   std::array<std::int16_t, kSizeX * kSizeY> heads_{};
   std::vector<std::int16_t> next_;

@@ -261,6 +261,32 @@ TEST_F(J1939BusTest, AFloodOfRequestsIsAnsweredOnceIn20Milliseconds) {
   EXPECT_GE(sent.size(), 12u);
 }
 
+// The bytes of this NAME add up to nothing, so that the standard lets the loser answer at once.
+TEST_F(J1939BusTest, AFloodOfRequestsIsAnsweredByTheLoserOnceIn20Milliseconds) {
+  bus = J1939Bus({Side::kPilot, kPilot, kTruck, 0x3000FF00FFE000F2}, hub.connect());
+  hold();
+  wire->send(claimOf(kName - 1));
+  run(ms(5));
+  sent.clear();
+  for (int i = 0; i < 250; ++i) {
+    wire->send(request(kGlobalAddress));
+    run(ms(1), ms(1));
+  }
+  EXPECT_LE(sent.size(), 13u);
+  EXPECT_GE(sent.size(), 12u);
+}
+
+TEST_F(J1939BusTest, ABusThatComesAndGoesIsClaimedOnOnceIn20Milliseconds) {
+  for (int i = 0; i < 125; ++i) {
+    hub.setState(BusState::kDown);
+    run(ms(1), ms(1));
+    hub.setState(BusState::kActive);
+    run(ms(1), ms(1));
+  }
+  EXPECT_LE(sent.size(), 13u);
+  EXPECT_GE(sent.size(), 12u);
+}
+
 TEST_F(J1939BusTest, AfterTheBusWasDownItClaimsAnew) {
   hold();
   hub.setState(BusState::kBusOff);

@@ -1,0 +1,81 @@
+// Fuzz target of all files that a user writes (libFuzzer); scripts/fuzz builds and runs it. Every input
+// is read as each kind of file; the parts of a file (a limiter, a lidar, a profile) are read with their
+// wholes. Nothing but ConfigError may come out, and what was read must do to make a stage of.
+#include <fstream>
+#include <string>
+
+#include "../../fuzz.h"
+#include "../../neural/small_network.h"
+#include "tunnel_pilot/bridge/bridge_parameters.h"
+#include "tunnel_pilot/drivers/lidar_driver.h"
+#include "tunnel_pilot/drivers/preview_parameters.h"
+#include "tunnel_pilot/drivers/step_driver.h"
+#include "tunnel_pilot/perception/centerline.h"
+#include "tunnel_pilot/perception/scan_filter.h"
+#include "tunnel_pilot/perception/wall_segmentation.h"
+#include "tunnel_pilot/simulation/scenario.h"
+#include "tunnel_pilot/simulation/simulator.h"
+#include "tunnel_pilot/simulation/truck_controller.h"
+#include "tunnel_pilot/supervision/arbiter.h"
+#include "tunnel_pilot/vehicle/truck_parameters.h"
+#include "tunnel_pilot/world/world.h"
+
+namespace {
+
+using namespace tunnel_pilot;
+
+/// Folders as the package has them, so that files beside the input are found.
+class Place {
+ public:
+  Place() {
+    namespace fs = std::filesystem;
+    fs::create_directory(folder_.file("inputs"));
+    for (const char* name : {"config", "scenarios", "worlds", "networks"}) {
+      fs::create_directory_symlink(std::string(TUNNEL_PILOT_SOURCE_DIR) + "/" + name,
+                                   folder_.file(name));
+    }
+  }
+  std::string folder() const { return folder_.file("inputs"); }
+  std::string file() const { return folder_.file("inputs/fuzz.yaml"); }  // its stem is a scenario's name
+
+ private:
+  neural::Folder folder_;
+};
+
+template <class Load>
+void refusedOrRead(const Load& load) {
+  try {
+    load();
+  } catch (const config::ConfigError& e) {
+    require(e.what()[0] != '\0', "a refusal says why");
+  }
+}
+
+void readAll(const config::Node& node, const Place& place) {
+  refusedOrRead([&] { perception::ScanFilter(perception::loadScanFilter(node)); });
+  refusedOrRead([&] { perception::WallSegmentation(perception::loadWallSegmentation(node)); });
+  refusedOrRead([&] { perception::CenterlineEstimator(perception::loadCenterline(node)); });
+  refusedOrRead([&] { supervision::loadArbiter(node); });
+  refusedOrRead([&] { bridge::loadBridge(node); });
+  refusedOrRead([&] { vehicle::loadTruck(node); });
+  refusedOrRead([&] { drivers::loadStepDriver(node); });
+  refusedOrRead([&] { drivers::loadLidarDriver(node, place.folder()); });
+  refusedOrRead([&] { drivers::loadPreviewDriver(node, place.folder()); });
+  refusedOrRead([&] { simulation::loadSimulator(node); });
+  refusedOrRead([&] { simulation::loadTruckController(node); });
+  // These read the file anew, which takes longer than all the others together.
+  if (node.has("start_at") || node.has("start")) refusedOrRead([&] { world::loadWorld(place.file()); });
+  if (node.has("experiment")) refusedOrRead([&] { simulation::loadScenario(place.file()); });
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const Place place;
+  {
+    std::ofstream out(place.file(), std::ios::binary | std::ios::trunc);
+    out.write(reinterpret_cast<const char*>(data), static_cast<std::streamsize>(size));
+  }
+  refusedOrRead([&] { readAll(config::loadFile(place.file()), place); });
+  return 0;
+}
