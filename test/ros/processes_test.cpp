@@ -1,8 +1,9 @@
 // A process of the pilot dies or hangs while a real-time truck drives: the truck is told to stop, or
 // finds by itself that nobody commands it, within the limit; and it drives again only by the operator's
 // hand. The truck is the simulator's, run by this program in steady time; every stage is a process of
-// its own.
+// its own, or a nodelet of one manager as in pilot.launch.
 #include <gtest/gtest.h>
+#include <nodelet/NodeletLoad.h>
 #include <poll.h>
 #include <ros/ros.h>
 #include <sensor_msgs/LaserScan.h>
@@ -132,34 +133,35 @@ class StopWatch {
   std::thread thread_;
 };
 
-class Processes : public ::testing::Test {
+const std::vector<std::string> kStages = {"scan_filter",    "wall_segmentation", "centerline",
+                                          "preview_driver", "lidar_driver",      "arbiter"};
+
+class RealTimeDrive : public ::testing::Test {
  protected:
-  Processes() : truck_(nh_, busName()), watch_(busName()) {
+  RealTimeDrive() : truck_(nh_, busName()), watch_(busName()) {
     status_subscriber_ = nh_.subscribe<TruckStatus>(
         "truck_status", 10, [this](const TruckStatus::ConstPtr& m) { status_ = *m; });
-    for (const std::string& stage : stages()) start(stage);
   }
-  ~Processes() override {
-    for (const std::string& stage : stages()) end(stage, SIGKILL);
+  ~RealTimeDrive() override {
+    while (!children_.empty()) end(children_.begin()->first, SIGKILL);
   }
 
   static std::string busName() { return ros::param::param<std::string>("/can_bridge/bus", ""); }
-  static const std::vector<std::string>& stages() {
-    static const std::vector<std::string> all = {"scan_filter",    "wall_segmentation", "centerline",
-                                                 "preview_driver", "lidar_driver",      "arbiter",
-                                                 "can_bridge"};
-    return all;
-  }
 
-  void start(const std::string& stage) {
-    const std::string program = std::string(TUNNEL_PILOT_NODE_FOLDER) + "/" + stage;
-    const std::string name = "__name:=" + stage;
+  void start(const std::string& name, std::vector<std::string> command) {
+    command.push_back("__name:=" + name);
+    std::vector<char*> arguments;
+    for (std::string& word : command) arguments.push_back(word.data());
+    arguments.push_back(nullptr);
     const pid_t child = fork();
     if (child == 0) {
-      execl(program.c_str(), program.c_str(), name.c_str(), nullptr);
+      execvp(arguments.front(), arguments.data());
       _exit(127);
     }
-    children_[stage] = child;
+    children_[name] = child;
+  }
+  void startNode(const std::string& stage) {
+    start(stage, {std::string(TUNNEL_PILOT_NODE_FOLDER) + "/" + stage});
   }
 
   void end(const std::string& stage, int signal) {
@@ -242,6 +244,41 @@ class Processes : public ::testing::Test {
   std::map<std::string, pid_t> children_;
 };
 
+class Processes : public RealTimeDrive {
+ protected:
+  Processes() {
+    for (const std::string& stage : stages()) startNode(stage);
+  }
+
+  static std::vector<std::string> stages() {
+    std::vector<std::string> all = kStages;
+    all.emplace_back("can_bridge");
+    return all;
+  }
+};
+
+class NodeletManager : public RealTimeDrive {
+ protected:
+  NodeletManager() {
+    startNode("can_bridge");
+    startManager();
+  }
+
+  void startManager() {
+    start(kManager, {"rosrun", "nodelet", "nodelet", "manager"});
+    const std::string service = std::string(kManager) + "/load_nodelet";
+    ASSERT_TRUE(spinUntil([&] { return ros::service::exists(service, false); }, 20.0));
+    for (const std::string& stage : kStages) {
+      nodelet::NodeletLoad load;
+      load.request.name = "/" + stage;
+      load.request.type = "tunnel_pilot/" + stage;
+      ASSERT_TRUE(ros::service::call(service, load) && load.response.success) << stage;
+    }
+  }
+
+  static constexpr const char* kManager = "pilot_manager";
+};
+
 TEST_F(Processes, EachThatIsKilledStopsTheTruck) {
   for (const std::string& stage : stages()) {
     std::vector<double> latencies;
@@ -250,7 +287,7 @@ TEST_F(Processes, EachThatIsKilledStopsTheTruck) {
       latencies.push_back(stopAfter(stage, SIGKILL));
       EXPECT_LE(latencies.back(), limit_) << stage;
       end(stage, SIGKILL);
-      start(stage);
+      startNode(stage);
     }
     tell(stage, "killed", latencies);
   }
@@ -270,6 +307,32 @@ TEST_F(Processes, EachThatHangsStopsTheTruckAndItsReturnDoesNotDrive) {
     }
     tell(stage, "hung", latencies);
   }
+}
+
+TEST_F(NodeletManager, KilledStopsTheTruck) {
+  std::vector<double> latencies;
+  for (int i = 0; i < times_; ++i) {
+    ASSERT_NO_FATAL_FAILURE(drive());
+    latencies.push_back(stopAfter(kManager, SIGKILL));
+    EXPECT_LE(latencies.back(), limit_);
+    end(kManager, SIGKILL);
+    ASSERT_NO_FATAL_FAILURE(startManager());
+  }
+  tell(kManager, "killed", latencies);
+  expectNoReturn();
+}
+
+TEST_F(NodeletManager, HungStopsTheTruckAndItsReturnDoesNotDrive) {
+  std::vector<double> latencies;
+  for (int i = 0; i < times_; ++i) {
+    ASSERT_NO_FATAL_FAILURE(drive());
+    latencies.push_back(stopAfter(kManager, SIGSTOP));
+    EXPECT_LE(latencies.back(), limit_);
+    spinUntil([] { return false; }, 0.2);
+    kill(children_.at(kManager), SIGCONT);
+    expectNoReturn();
+  }
+  tell(kManager, "hung", latencies);
 }
 
 }  // namespace
