@@ -5,7 +5,6 @@
 
 #include <cmath>
 #include <optional>
-#include <vector>
 
 #include "../../fuzz.h"
 #include "j1939_fuzz.h"
