@@ -24,6 +24,9 @@
 #include <xmlrpcpp/XmlRpcClient.h>
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <csignal>
 #include <deque>
 #include <fstream>
@@ -31,7 +34,9 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "tunnel_pilot/can/codec.h"
@@ -54,10 +59,16 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 ros::SteadyTime steadyIn(double seconds) { return ros::SteadyTime::now() + ros::WallDuration(seconds); }
 
 /// The truck's end of the embedded bus. Every frame goes into the log with the simulated time at which
-/// it was sent or taken in.
+/// it was sent or taken in. A thread fetches what comes: the kernel keeps eleven datagrams and no more,
+/// and while the campaign waits for a service the bridge may say more than that.
 class LoggedBus : public can::Bus {
  public:
-  LoggedBus(const std::string& name, can::LogWriter& log) : wire_(name), log_(log) {}
+  LoggedBus(const std::string& name, can::LogWriter& log)
+      : wire_(name), log_(log), fetcher_([this] { fetch(); }) {}
+  ~LoggedBus() override {
+    ends_ = true;
+    fetcher_.join();
+  }
 
   void setTime(Stamp now) { now_ = now; }
   bool send(const can::Frame& frame) override {
@@ -77,21 +88,44 @@ class LoggedBus : public can::Bus {
 
   /// Takes in what waits; TP_STATUS ends a set of the pilot's.
   void pump() {
-    while (const auto frame = wire_.receive()) {
-      log_.frame(*frame, now_);
-      waiting_.push_back(*frame);
-      if (frame->id == can::kTpStatusId)
-        last_set_ = now_ - now_ % kClockPeriod;  // by the bridge's clock
+    std::deque<can::Frame> frames;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      frames.swap(fetched_);
     }
+    for (const can::Frame& frame : frames) {
+      log_.frame(frame, now_);
+      waiting_.push_back(frame);
+      if (frame.id == can::kTpStatusId) last_set_ = now_ - now_ % kClockPeriod;  // by the bridge's clock
+    }
+  }
+  void awaitFrames(std::chrono::milliseconds longest) {
+    std::unique_lock<std::mutex> lock(mutex_);
+    arrival_.wait_for(lock, longest, [this] { return !fetched_.empty(); });
   }
   Stamp lastSet() const { return last_set_; }
   std::uint64_t dropped() const { return wire_.dropped(); }
 
  private:
+  void fetch() {
+    while (!ends_) {
+      pollfd readable{wire_.descriptor(), POLLIN, 0};
+      poll(&readable, 1, 20);
+      const std::lock_guard<std::mutex> lock(mutex_);
+      while (const auto frame = wire_.receive()) fetched_.push_back(*frame);
+      if (!fetched_.empty()) arrival_.notify_all();
+    }
+  }
+
   can::EmbeddedBus wire_;
   can::LogWriter& log_;
   std::deque<can::Frame> waiting_;
   Stamp now_{}, last_set_{};
+  std::mutex mutex_;  // of what was fetched
+  std::condition_variable arrival_;
+  std::deque<can::Frame> fetched_;
+  std::atomic<bool> ends_{false};
+  std::thread fetcher_;
 };
 
 /// can_bridge as a process of the campaign's own, which it kills and holds up.
@@ -214,8 +248,7 @@ class Campaign {
     }
     const ros::SteadyTime limit = steadyIn(1.0);
     while (now() - bus_.lastSet() >= kFramePeriod && ros::ok()) {
-      pollfd readable{bus_.descriptor(), POLLIN, 0};
-      poll(&readable, 1, 2);
+      bus_.awaitFrames(std::chrono::milliseconds(2));
       bus_.pump();
       ros::getGlobalCallbackQueue()->callAvailable();
       if (ros::SteadyTime::now() > limit) {
