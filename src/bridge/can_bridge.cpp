@@ -276,6 +276,7 @@ void CanBridge::raise(Event event, Stamp now, Reason carried) {
 void CanBridge::tick(Stamp now) {
   if (now < last_tick_) clockJumped(now);
   last_tick_ = now;
+  sender_.pass(now);
   listen(now);
   advance(now);
 }

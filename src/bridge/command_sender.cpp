@@ -1,5 +1,6 @@
 #include "tunnel_pilot/bridge/command_sender.h"
 
+#include <algorithm>
 #include <optional>
 
 #include "tunnel_pilot/can/protection.h"
@@ -8,21 +9,23 @@ namespace tunnel_pilot::bridge {
 
 CommandSender::CommandSender(double period) : period_(fromSeconds(period)) {}
 
+void CommandSender::pass(Stamp now) {
+  counted_ += std::clamp(now - passed_at_, Stamp::zero(), kLongestTick);
+  passed_at_ = now;
+}
+
 void CommandSender::forgetTime(Stamp now) {
   started_ = false;
-  // As if the last set had been sent right now: a little strict, and a clock that jumps on and on is
-  // bounded.
-  const Stamp shift = now - sent_at_[(sets_sent_ + kMaxFrames - 1) % kMaxFrames];
-  for (Stamp& at : sent_at_) at += shift;
+  passed_at_ = now;
 }
 
 bool CommandSender::due(bool stop, Stamp now) const {
   return !started_ || now >= next_ - kEarly || (stop && !stop_told_);
 }
 
-bool CommandSender::withinRate(Stamp now) const {
+bool CommandSender::withinRate() const {
   if (sets_sent_ < kMaxFrames) return true;
-  return now - sent_at_[sets_sent_ % kMaxFrames] > kWindow;  // the oldest of the ring
+  return counted_ - sent_at_[sets_sent_ % kMaxFrames] > kWindow;  // the oldest of the ring
 }
 
 template <class Fields>
@@ -35,7 +38,8 @@ bool CommandSender::sendOne(const Fields& fields, can::Bus& bus) {
 
 bool CommandSender::send(can::TruckCommandFrame command, can::CommandInfoFrame info,
                          can::BridgeStatusFrame status, can::Bus& bus, Stamp now) {
-  if (!withinRate(now)) {
+  pass(now);
+  if (!withinRate()) {
     ++sets_blocked_;
     return false;
   }
@@ -44,7 +48,7 @@ bool CommandSender::send(can::TruckCommandFrame command, can::CommandInfoFrame i
   next_ = (in_step ? next_ : now) + period_;
   started_ = true;
   command.counter = info.counter = status.counter = counter_ = can::nextCounter(counter_);
-  sent_at_[sets_sent_++ % kMaxFrames] = now;
+  sent_at_[sets_sent_++ % kMaxFrames] = counted_;
   stop_told_ = command.stop;
   if (sendOne(command, bus) && sendOne(info, bus) && sendOne(status, bus)) {
     failed_in_row_ = 0;

@@ -646,6 +646,7 @@ TEST(CommandSender, BlocksTheSeventeenthFrameOfAQuarterSecond) {
   const auto bus = hub.connect();
   CommandSender sender(0.02);
   for (int i = 0; i < 16; ++i) EXPECT_TRUE(sender.send({}, {}, {}, *bus, ms(i)));
+  for (int time = 20; time < 250; time += 10) sender.pass(ms(time));
   EXPECT_FALSE(sender.send({}, {}, {}, *bus, ms(250)));
   EXPECT_TRUE(sender.send({}, {}, {}, *bus, ms(251)));
   EXPECT_EQ(sender.setsBlocked(), 1u);
@@ -674,9 +675,31 @@ TEST(CommandSender, TheBoundOnTheRateGoesOnOverAClockJump) {
     sender.forgetTime(ms(5000));
     for (int i = before; i < 16; ++i) EXPECT_TRUE(sender.send({}, {}, {}, *bus, ms(5001)));
     const int oldest = 5000 - 10 * (before - 1);
+    for (int time = 5010; time < oldest + 250; time += 10) sender.pass(ms(time));
     EXPECT_FALSE(sender.send({}, {}, {}, *bus, ms(oldest + 250))) << before;
     EXPECT_TRUE(sender.send({}, {}, {}, *bus, ms(oldest + 251))) << before;
   }
+}
+
+// Forward it is no jump that anybody tells of: the time simply is much later.
+TEST(CommandSender, AClockThatGoesForwardAndBackMakesNoRoom) {
+  can::MemoryBusHub hub;
+  const auto bus = hub.connect();
+  CommandSender sender(0.02);
+  for (int i = 0; i < 16; ++i) EXPECT_TRUE(sender.send({}, {}, {}, *bus, ms(i)));
+  EXPECT_FALSE(sender.send({}, {}, {}, *bus, ms(1000)));
+  sender.forgetTime(ms(20));
+  EXPECT_FALSE(sender.send({}, {}, {}, *bus, ms(30)));
+}
+
+TEST(CommandSender, ATickAddsUpTo25MsToTheTimeOfTheBound) {
+  can::MemoryBusHub hub;
+  const auto bus = hub.connect();
+  CommandSender sender(0.02);
+  for (int i = 0; i < 16; ++i) EXPECT_TRUE(sender.send({}, {}, {}, *bus, ms(0)));
+  for (int i = 1; i <= 9; ++i) sender.pass(ms(1000 * i));
+  EXPECT_FALSE(sender.send({}, {}, {}, *bus, ms(10000)));
+  EXPECT_TRUE(sender.send({}, {}, {}, *bus, ms(10001))) << "251 ms";
 }
 
 TEST(CommandSender, ADriveAtItsPaceSendsAtOnceAfterAClockJump) {

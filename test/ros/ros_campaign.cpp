@@ -96,7 +96,12 @@ class LoggedBus : public can::Bus {
     for (const can::Frame& frame : frames) {
       log_.frame(frame, now_);
       waiting_.push_back(frame);
-      if (frame.id == can::kTpStatusId) last_set_ = now_ - now_ % kClockPeriod;  // by the bridge's clock
+      if (const auto command = can::decode<can::TruckCommandFrame>(frame)) stop_told_ = command->stop;
+      if (const auto status = can::decode<can::BridgeStatusFrame>(frame)) {
+        drives_ =
+            status->state == TruckStatus::STATE_ACTIVE || status->state == TruckStatus::STATE_DEGRADED;
+        last_set_ = now_ - now_ % kClockPeriod;  // by the bridge's clock
+      }
     }
   }
   void awaitFrames(std::chrono::milliseconds longest) {
@@ -104,6 +109,8 @@ class LoggedBus : public can::Bus {
     arrival_.wait_for(lock, longest, [this] { return !fetched_.empty(); });
   }
   Stamp lastSet() const { return last_set_; }
+  /// By the pilot's last frames it drives, and no stop is told.
+  bool drivesOn() const { return drives_ && !stop_told_; }
   std::uint64_t dropped() const { return wire_.dropped(); }
 
  private:
@@ -121,6 +128,7 @@ class LoggedBus : public can::Bus {
   can::LogWriter& log_;
   std::deque<can::Frame> waiting_;
   Stamp now_{}, last_set_{};
+  bool stop_told_ = false, drives_ = false;
   std::mutex mutex_;  // of what was fetched
   std::condition_variable arrival_;
   std::deque<can::Frame> fetched_;
@@ -133,7 +141,6 @@ class BridgeProcess {
  public:
   ~BridgeProcess() { kill(); }
   void start() {
-    held_ = false;
     pid_ = fork();
     if (pid_ != 0) return;
     const std::string program = std::string(TUNNEL_PILOT_NODE_FOLDER) + "/can_bridge";
@@ -146,15 +153,10 @@ class BridgeProcess {
     waitpid(pid_, nullptr, 0);
     pid_ = -1;
   }
-  void hold(bool on) {
-    held_ = on;
-    ::kill(pid_, on ? SIGSTOP : SIGCONT);
-  }
-  bool held() const { return held_; }
+  void hold(bool on) { ::kill(pid_, on ? SIGSTOP : SIGCONT); }
 
  private:
   pid_t pid_ = -1;
-  bool held_ = false;
 };
 
 /// What was injected, and what came of it.
@@ -237,25 +239,31 @@ class Campaign {
     if (tick) awaitBridge();
   }
 
-  // Time stands still until the bridge has said what is due, so that the machine's load changes nothing.
-  // Who is known to be dead or held up, or has not come up yet, is not waited for.
+  // Time stands still until the bridge has said what is due, and has stopped when the arbiter has asked
+  // it to, so that the machine's load changes nothing. Who has not come up yet is not waited for.
   void awaitBridge() {
     ros::getGlobalCallbackQueue()->callAvailable();
     bus_.pump();
-    if (bridge_.held() || bus_.lastSet() == Stamp{}) {
+    if (bus_.lastSet() == Stamp{}) {
       ros::WallDuration(0.002).sleep();
       return;
     }
     const ros::SteadyTime limit = steadyIn(1.0);
-    while (now() - bus_.lastSet() >= kFramePeriod && ros::ok()) {
+    while ((now() - bus_.lastSet() >= kFramePeriod || owesStop()) && ros::ok()) {
       bus_.awaitFrames(std::chrono::milliseconds(2));
       bus_.pump();
       ros::getGlobalCallbackQueue()->callAvailable();
       if (ros::SteadyTime::now() > limit) {
         ++record_.late_sets;
+        stop_asked_ = false;
         return;
       }
     }
+  }
+
+  bool owesStop() {
+    if (!bus_.drivesOn()) stop_asked_ = false;
+    return stop_asked_;
   }
 
   // The pilot's answer to a good scan. Who does not answer in time has less and less of it: 20 ms for
@@ -275,7 +283,9 @@ class Campaign {
   void onCommand(const ros::MessageEvent<TruckCommand const>& event) {
     if (event.getPublisherName() == ros::this_node::getName()) return;
     command_ = *event.getMessage();
-    if (command_.stop) log_.event("command_stop", now());
+    if (!command_.stop) return;
+    log_.event("command_stop", now());
+    stop_asked_ = true;
   }
 
   void onStatus(const TruckStatus& status) {
@@ -301,7 +311,7 @@ class Campaign {
 
   // A stop counts from when it was asked for, the other edges from when they were accepted.
   bool edge(const std::string& name, bool counts_when_accepted) {
-    if (bridge_.held() || !ros::service::exists(name, false)) {
+    if (!ros::service::exists(name, false)) {
       ++record_.edges_lost;
       return false;
     }
@@ -367,7 +377,6 @@ class Campaign {
     calm_ = true;
     burst_ended_ = now();
     scan_fault_.clear();
-    if (bridge_.held()) bridge_.hold(false);
     if (manager_held_ > 0) kill(manager_held_, SIGCONT);
     manager_held_ = 0;
     if (!unloaded_.empty()) loadAgain();
@@ -608,6 +617,10 @@ class Campaign {
     message.acceleration = below(2) == 0 ? odd() : 1.0;
     message.stop = below(4) == 0;
     message.source = static_cast<std::uint8_t>(below(256));
+    // A lie about a driver's fresh measurement cannot be found: against it, the publisher is pinned.
+    const bool names_driver = message.source == TruckCommand::SOURCE_LIDAR_DRIVER ||
+                              message.source == TruckCommand::SOURCE_PREVIEW_DRIVER;
+    if (names_driver) message.source = TruckCommand::SOURCE_TELEOPERATION;
     message.reason = static_cast<std::uint8_t>(below(256));
     rogue_command_.publish(message);
   }
@@ -674,7 +687,7 @@ class Campaign {
         return;
       case 1:
         tally("process: bridge held up");
-        bridge_.hold(true);
+        holdBridge();
         return;
       case 2:
         tally("process: the nodelets' manager held up");
@@ -691,6 +704,18 @@ class Campaign {
         ros::service::call("pilot_manager/unload_nodelet", unload);
       }
     }
+  }
+
+  // Meanwhile no clock is published: a process with a clock of its own finds it later when it goes on,
+  // once, and does not live through what it missed.
+  void holdBridge() {
+    bridge_.hold(true);
+    const Stamp until = now() + fromSeconds(0.02 + 0.4 * uniform());
+    while (now() < until || now() % kClockPeriod != Stamp::zero()) {
+      bus_.setTime(now() + fromSeconds(simulator_->parameters().step));
+      simulator_->step();
+    }
+    bridge_.hold(false);
   }
 
   // The truck is alone for a while, in simulated time, then the new bridge speaks and is waited for
@@ -798,6 +823,7 @@ class Campaign {
   std::vector<Fault*> burst_;
   std::string scan_fault_, unloaded_;
   pid_t manager_held_ = 0;
+  bool stop_asked_ = false;  ///< by the arbiter
   bool calm_ = true;
   unsigned operator_ticks_ = 0;
   Stamp burst_until_{}, jumped_{}, burst_ended_ = kStart, drove_since_{},
