@@ -191,7 +191,7 @@ void CanBridge::clockJumped(Stamp now) {
   healthy_since_.reset();
   undegraded_since_.reset();
   standing_since_.reset();
-  entered_ = sent_at_ = last_tick_ = now;
+  entered_ = last_tick_ = now;
   watch_.reset(link_.feedback().articulation_angle, now);
   raise(Event::kClockJump, now);
   sendIfDue(now);
@@ -386,12 +386,12 @@ bool CanBridge::stopBit(Stamp now) const {
 
 // Last stage before the codec: no wider than the speed allows (a hold is what was measured), never
 // faster than steering_rate, starting from the measured angle.
-double CanBridge::limitedAngle(double wanted, bool steering, Stamp now) {
+double CanBridge::limitedAngle(double wanted, bool steering) {
   const double measured = std::clamp(link_.feedback().articulation_angle, -max_angle_, max_angle_);
   if (!steering) return measured;
   const double from = steering_sent_ ? sent_angle_ : measured;
-  const double elapsed = std::min(toSeconds(now - sent_at_), parameters_.frame_period);
-  const double step = parameters_.steering_rate * std::max(elapsed, 0.0);
+  const double elapsed = std::min(toSeconds(tick_time_.now() - sent_at_), parameters_.frame_period);
+  const double step = parameters_.steering_rate * elapsed;
   if (!held_angle_) wanted = std::clamp(wanted, -widestAngle(), widestAngle());
   return std::clamp(wanted, from - step, from + step);
 }
@@ -411,6 +411,7 @@ bool CanBridge::tooOldOnTheBus(Stamp now) const {
 }
 
 void CanBridge::sendIfDue(Stamp now) {
+  tick_time_.tick(now);
   if (transmit_.full() || transmit_.stalled() || !sender_.due(stopBit(now), now)) return;
   if (tooOldOnTheBus(now)) return;
   const can::TruckCommandFrame command = composeCommand(now);
@@ -422,7 +423,7 @@ void CanBridge::sendIfDue(Stamp now) {
   // After sets that the bus refused (it is down, or claims its address) the angle begins at the measured
   // one.
   steering_sent_ = command.steering_enable && !sender_.broken();
-  sent_at_ = now;
+  sent_at_ = tick_time_.now();
 }
 
 can::TruckCommandFrame CanBridge::composeCommand(Stamp now) {
@@ -440,8 +441,7 @@ can::TruckCommandFrame CanBridge::composeCommand(Stamp now) {
   frame.stop = stopBit(now);
   frame.mode = static_cast<std::uint8_t>(
       isEngaged(status_.state) || status_.state == S::kStopping ? command.mode : Mode::kStandby);
-  frame.articulation_angle =
-      limitedAngle(held_angle_.value_or(command.articulation_angle), steering, now);
+  frame.articulation_angle = limitedAngle(held_angle_.value_or(command.articulation_angle), steering);
   if (steering && !frame.stop) {
     const double highest =
         status_.state == S::kDegraded ? parameters_.degraded_speed : parameters_.max_speed;

@@ -1,7 +1,5 @@
 #include "tunnel_pilot/can/address_claim.h"
 
-#include <algorithm>
-
 #include "tunnel_pilot/can/j1939.h"
 
 namespace tunnel_pilot::can {
@@ -31,19 +29,18 @@ Frame claimFrame(std::uint8_t source, std::uint64_t name) {
 AddressClaim::AddressClaim(std::uint8_t address, std::uint64_t name) : address_(address), name_(name) {}
 
 void AddressClaim::tick(Stamp now, bool on_its_way) {
-  if (last_tick_) time_ += std::clamp(now - *last_tick_, Stamp::zero(), kLongestStep);
-  last_tick_ = now;
+  time_.tick(now);
   if (state_ != State::kContending) return;
-  if (on_its_way) since_ = time_;
-  if (time_ - since_ >= kContention) state_ = State::kHeld;
+  if (on_its_way) since_ = time_.now();
+  if (time_.now() - since_ >= kContention) state_ = State::kHeld;
 }
 
 std::optional<Frame> AddressClaim::due() const {
-  if (time_ - sent_at_ < kSpacing) return std::nullopt;
+  if (time_.now() - sent_at_ < kSpacing) return std::nullopt;
   if (state_ == State::kUnclaimed) return claimFrame(address_, name_);
   if (!answer_) return std::nullopt;
   if (state_ == State::kLost) {
-    if (time_ - since_ < shyness()) return std::nullopt;
+    if (time_.now() - since_ < shyness()) return std::nullopt;
     return claimFrame(kNullAddress, name_);
   }
   return claimFrame(address_, name_);
@@ -51,10 +48,10 @@ std::optional<Frame> AddressClaim::due() const {
 
 void AddressClaim::sent() {
   answer_ = false;
-  sent_at_ = time_;
+  sent_at_ = time_.now();
   if (state_ == State::kLost || state_ == State::kHeld) return;
   state_ = State::kContending;
-  since_ = time_;
+  since_ = time_.now();
 }
 
 bool AddressClaim::hear(const Frame& frame) {
@@ -67,7 +64,7 @@ bool AddressClaim::hear(const Frame& frame) {
   const bool request = id.pgn == kRequestPgn && for_us && frame.length == kRequestLength &&
                        (littleEndian(frame) & 0xFFFFFF) == kAddressClaimedPgn;
   if (!request || id.source == address_) return false;
-  if (state_ == State::kLost && !answer_) since_ = time_;
+  if (state_ == State::kLost && !answer_) since_ = time_.now();
   answer_ = true;
   return true;
 }
@@ -78,17 +75,17 @@ void AddressClaim::hearClaim(std::uint64_t name) {
   if (name > name_) return;
   lost_to_ = name;
   state_ = State::kLost;
-  since_ = time_;
+  since_ = time_.now();
 }
 
 void AddressClaim::forget() {
-  began_ = time_;
+  began_ = time_.now();
   if (state_ != State::kLost) state_ = State::kUnclaimed;
 }
 
 bool AddressClaim::overdue() const {
   const bool claims = state_ == State::kUnclaimed || state_ == State::kContending;
-  return claims && time_ - began_ >= kOverdue;
+  return claims && time_.now() - began_ >= kOverdue;
 }
 
 // Bytes of the NAME as the pseudo-random number that the standard asks for: the same in every run.

@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tunnel_pilot/bridge/can_bridge.h"
@@ -78,6 +79,9 @@ struct Faults {
   bool process_silent = false;
 };
 
+constexpr Stamp kToldJump =
+    std::chrono::milliseconds(100);  ///< what the shell takes for a jump of the clock
+
 /// Bridge and truck, and between them a wire that a log is kept of. Time is the bus's own; the bridge's
 /// clock may jump against it.
 class Rig {
@@ -117,6 +121,7 @@ class Rig {
     if (now_ < next_tick_) return;
     next_tick_ = now_ + tick_period_;
     bridge_.setSilentProcess(heartbeats_.silent(now_));
+    if (std::exchange(jumped_ahead_, false)) bridge_.clockJumped(clock());
     bridge_.tick(clock());
     carry();
   }
@@ -155,12 +160,11 @@ class Rig {
   bool isJ1939() const { return profile_.kind == can::ProfileKind::kJ1939; }
   const can::J1939Parameters& pilot() const { return profile_.j1939; }
 
+  /// As on the truck, it is the next tick that finds it.
   void jumpClock(Stamp by) {
     offset_ += by;
     event("clock " + std::to_string(1e3 * toSeconds(offset_)));
-    if (by > Stamp::zero()) bridge_.clockJumped(clock());
-    bridge_.tick(clock());
-    carry();
+    jumped_ahead_ = jumped_ahead_ || by > kToldJump;
   }
 
   void setBus(can::BusState state) {
@@ -283,6 +287,7 @@ class Rig {
   }
 
   Stamp now_, offset_{}, tick_period_;
+  bool jumped_ahead_ = false;  ///< since the last tick
   can::LogWriter* log_;
   can::MemoryBusHub bridge_side_, truck_side_;
   can::Profile profile_;

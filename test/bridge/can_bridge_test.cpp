@@ -132,6 +132,20 @@ TEST_F(CanBridgeTest, LimitsTheRateOfAStepInTheCommand) {
   EXPECT_NEAR(rig.judge.last->articulation_angle, 40.0 * kDeg, 0.01 * kDeg);
 }
 
+TEST_F(CanBridgeTest, AClockThatRunsAheadALittleTurnsByOneTickAtMost) {
+  rig.drive();
+  rig.command.articulation_angle = 40.0 * kDeg;
+  rig.run(0.2);
+  const std::size_t before = rig.judge.times.size();
+  rig.run(0.1, [&] { return rig.judge.times.size() > before; });
+  const double start = rig.judge.last->articulation_angle;
+  rig.now += ms(5);
+  rig.bridge->tick(rig.now + ms(15));  // a frame is due by this clock
+  rig.pump();
+  ASSERT_EQ(rig.judge.times.size(), before + 2);
+  EXPECT_NEAR(rig.judge.last->articulation_angle - start, 15.0 * kDeg * 0.005, 0.01 * kDeg);
+}
+
 TEST_F(CanBridgeTest, StartsToSteerFromTheMeasuredAngle) {
   rig.plant.reset(geometry::Pose(), 20.0 * kDeg, 0.0);
   rig.command.articulation_angle = -20.0 * kDeg;

@@ -15,6 +15,7 @@
 #include "tunnel_pilot/bridge/truck_link.h"
 #include "tunnel_pilot/can/bus.h"
 #include "tunnel_pilot/drivers/driver.h"
+#include "tunnel_pilot/geometry/tick_time.h"
 #include "tunnel_pilot/supervision/command.h"
 #include "tunnel_pilot/vehicle/truck_parameters.h"
 
@@ -132,7 +133,7 @@ class CanBridge {
   bool steeringEnabled(Stamp now) const;
   bool tooOldOnTheBus(Stamp now) const;
   bool stopBit(Stamp now) const;
-  double limitedAngle(double wanted, bool steering, Stamp now);
+  double limitedAngle(double wanted, bool steering);
   double widestAngle() const;
   void sendIfDue(Stamp now);
   can::TruckCommandFrame composeCommand(Stamp now);
@@ -155,6 +156,7 @@ class CanBridge {
   std::optional<std::string> silent_process_;
   std::uint32_t sequence_offset_ = 0;  ///< added to the arbiter's numbers, so that they never decrease
   Stamp last_tick_{};
+  TickTime tick_time_;
   Stamp entered_{};                        ///< the present state
   std::optional<Stamp> asked_to_discard_;  ///< since the bus last worked
   std::uint64_t confirmed_in_fault_ = 0;   ///< frames, when the bus last failed
@@ -165,9 +167,9 @@ class CanBridge {
   std::optional<Stamp> standing_since_;
   std::optional<double> held_angle_;  ///< of a stop without a usable command [rad]
   double sent_angle_ = 0.0;           ///< [rad]
-  Stamp sent_at_{};
-  bool stop_steers_ = false;    ///< the stop began while driving
-  bool steering_sent_ = false;  ///< the last frame had steering enabled
+  Stamp sent_at_{};                   ///< the last set, by tick_time_
+  bool stop_steers_ = false;          ///< the stop began while driving
+  bool steering_sent_ = false;        ///< the last frame had steering enabled
 };
 
 }  // namespace tunnel_pilot::bridge

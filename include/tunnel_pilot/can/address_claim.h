@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "tunnel_pilot/can/frame.h"
-#include "tunnel_pilot/geometry/time.h"
+#include "tunnel_pilot/geometry/tick_time.h"
 
 namespace tunnel_pilot::can {
 
@@ -18,13 +18,11 @@ class AddressClaim {
  public:
   static constexpr Stamp kContention = std::chrono::milliseconds(250);
   static constexpr Stamp kSpacing = std::chrono::milliseconds(20);
-  static constexpr Stamp kLongestStep = std::chrono::milliseconds(50);
 
   AddressClaim(std::uint8_t address, std::uint64_t name);
 
   /// Time goes on. `on_its_way`: a claim that the bus has taken is not proven to be sent; the contention
-  /// begins when it is. A step back counts as none, and one of more than kLongestStep as that long: a
-  /// clock that jumps shortens no wait.
+  /// begins when it is. A clock that jumps shortens no wait (TickTime).
   void tick(Stamp now, bool on_its_way);
 
   /// The frame to be sent now; sent() tells that the bus has taken it.
@@ -54,8 +52,7 @@ class AddressClaim {
   State state_ = State::kUnclaimed;
   bool answer_ = false;  ///< somebody is to be told
   std::optional<std::uint64_t> lost_to_;
-  std::optional<Stamp> last_tick_;
-  Stamp time_{};   ///< own time, of the steps
+  TickTime time_;
   Stamp began_{};  ///< to claim
   Stamp since_{};  ///< contending, or owing an answer as the loser
   Stamp sent_at_ = -kSpacing;

@@ -85,13 +85,12 @@ class Scene {
   }
 
  private:
-  // Steps of 10 ms and any others, back ones too; the claim's own time knows none above 50 ms.
+  // Steps of 10 ms and any others, back ones too; the claim has a time of its own.
   void tick() {
     const auto size = bytes_.take<std::int16_t>();
     const Stamp by = size % 2 == 0 ? Stamp(std::chrono::milliseconds(10)) : size * kFar;
     const Stamp next = std::clamp(now_ + by, -kFarthest, kFarthest);
-    if (ticked_) time_ += std::clamp(next - now_, Stamp::zero(), AddressClaim::kLongestStep);
-    ticked_ = true;
+    time_.tick(next);
     now_ = next;
     bus_->tick(now_);
     if (!wire_.sent) return;
@@ -100,8 +99,8 @@ class Scene {
             "time sends claims alone");
     require(nameOf(*wire_.sent) == parameters_.name, "a claim holds the own NAME");
     require(id.source == (lost_ ? kNullAddress : parameters_.source_address), "a claim's source");
-    require(!said_at_ || time_ - *said_at_ >= AddressClaim::kSpacing, "one claim in 20 ms");
-    said_at_ = time_;
+    require(!said_at_ || time_.now() - *said_at_ >= AddressClaim::kSpacing, "one claim in 20 ms");
+    said_at_ = time_.now();
     wire_.sent.reset();
   }
 
@@ -183,8 +182,7 @@ class Scene {
   Wire wire_;
   std::unique_ptr<J1939Bus> bus_;
   Stamp now_{};
-  Stamp time_{};  // own time of the claim
-  bool ticked_ = false;
+  TickTime time_;  // of the claim
   bool lost_ = false;
   std::optional<Stamp> said_at_;
 };
