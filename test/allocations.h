@@ -1,6 +1,6 @@
 #pragma once
 
-// Counts what a program takes from the heap, by whatever way: to be included by one file of a test
+// Counts what a thread takes from the heap, by whatever way: to be included by one file of a test
 // program of its own. A build under the address sanitizer has a heap of its own, there is nothing to
 // count.
 #include <cerrno>
@@ -10,7 +10,7 @@
 namespace tunnel_pilot {
 
 inline long& allocations() {
-  static long count = 0;
+  thread_local long count = 0;
   return count;
 }
 

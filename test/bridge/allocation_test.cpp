@@ -4,12 +4,19 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "../allocations.h"
 #include "tunnel_pilot/bridge/can_bridge.h"
 #include "tunnel_pilot/can/codec.h"
+#include "tunnel_pilot/can/j1939.h"
+#include "tunnel_pilot/can/j1939_bus.h"
+#include "tunnel_pilot/can/layout.h"
 #include "tunnel_pilot/can/protection.h"
+#include "tunnel_pilot/can/socket_can_bus.h"
 
 namespace tunnel_pilot::bridge {
 namespace {
@@ -18,33 +25,92 @@ using supervision::Command;
 using supervision::Mode;
 using supervision::Reason;
 
-// A bus without a heap: up to 64 frames wait for the bridge.
+constexpr std::uint8_t kPilot = 128, kTruck = 48;  // J1939 addresses
+
+// What is on the wire, without a heap: up to 64 frames or echoes wait for the bridge.
+class Wire {
+ public:
+  void give(can::Received::Kind kind, const can::Frame& frame) {
+    waiting_[last_++ % waiting_.size()] = {kind, frame, 0};
+  }
+  can::Received take() {
+    return first_ == last_ ? can::Received() : waiting_[first_++ % waiting_.size()];
+  }
+
+  std::uint64_t sent = 0;
+
+ private:
+  std::array<can::Received, 64> waiting_{};
+  std::size_t first_ = 0, last_ = 0;
+};
+
 class FixedBus : public can::Bus {
  public:
-  bool send(const can::Frame& frame) override {
-    sent_ = frame;
-    ++confirmed_;
-    return true;
-  }
+  explicit FixedBus(Wire& wire) : wire_(wire) {}
+  bool send(const can::Frame&) override { return ++wire_.sent, true; }
   std::optional<can::Frame> receive() override {
-    if (first_ == last_) return std::nullopt;
-    return waiting_[first_++ % waiting_.size()];
+    const can::Received received = wire_.take();
+    if (received.kind == can::Received::Kind::kNothing) return std::nullopt;
+    return received.frame;
   }
-  std::uint64_t confirmed() const override { return confirmed_; }
+  std::uint64_t confirmed() const override { return wire_.sent; }
   can::BusState state() const override { return can::BusState::kActive; }
   int descriptor() const override { return -1; }
 
-  void give(const std::optional<can::Frame>& frame) { waiting_[last_++ % waiting_.size()] = *frame; }
+ private:
+  Wire& wire_;
+};
+
+// A kernel that echoes at once.
+class FixedSocket : public can::CanSocket {
+ public:
+  explicit FixedSocket(Wire& wire) : wire_(wire) {}
+  int open(const std::vector<can::Identifier>&) override { return 0; }
+  void close() override {}
+  int send(const can::Frame& frame) override {
+    ++wire_.sent;
+    wire_.give(can::Received::Kind::kEcho, frame);
+    return 0;
+  }
+  can::Received receive() override { return wire_.take(); }
+  can::CanLink link() override {
+    can::CanLink link;
+    link.present = link.up = link.carrier = link.controller = link.echoes = link.configured = true;
+    return link;
+  }
+  std::optional<can::CanLink> nextChange() override { return std::nullopt; }
+  bool startCycle() override { return false; }
+  can::LinkCycle cycle() override { return {}; }
+  int descriptor() const override { return -1; }
 
  private:
-  std::array<can::Frame, 64> waiting_{};
-  std::size_t first_ = 0, last_ = 0;
-  can::Frame sent_;
-  std::uint64_t confirmed_ = 0;
+  Wire& wire_;
 };
+
+enum class BusKind { kBare, kSocketCan, kJ1939OnSocketCan };
+
+std::unique_ptr<can::Bus> makeBus(BusKind kind, Wire& wire) {
+  if (kind == BusKind::kBare) return std::make_unique<FixedBus>(wire);
+  const can::J1939Parameters network{can::Side::kPilot, kPilot, kTruck, 1};
+  const bool plain = kind == BusKind::kSocketCan;
+  std::vector<can::Identifier> listen;
+  for (const can::FrameLayout& layout : can::frameLayouts()) listen.push_back({layout.id, false});
+  auto bus = std::make_unique<can::SocketCanBus>("can0", plain ? listen : can::j1939Identifiers(network),
+                                                 std::make_unique<FixedSocket>(wire));
+  if (plain) return bus;
+  return std::make_unique<can::J1939Bus>(network, std::move(bus));
+}
 
 // A truck that obeys at once, an arbiter, and the bridge between them, all without a heap of their own.
 struct Drive {
+  explicit Drive(BusKind on) : kind(on), bus(makeBus(on, wire)) {
+    feedback.operator_enable = feedback.autonomy_enabled = true;
+    status.operator_key = true;
+    command.speed = 3.0;
+    command.acceleration = 0.8;
+    command.mode = Mode::kAutonomous;
+  }
+
   static std::string file(const std::string& name) {
     return std::string(TUNNEL_PILOT_SOURCE_DIR) + "/config/" + name;
   }
@@ -53,9 +119,9 @@ struct Drive {
   void cycle() {
     counter = can::nextCounter(counter);
     feedback.counter = motion.counter = status.counter = counter;
-    bus.give(can::encode(feedback));
-    bus.give(can::encode(motion));
-    bus.give(can::encode(status));
+    say(*can::encode(feedback));
+    say(*can::encode(motion));
+    say(*can::encode(status));
     if (arbiter_alive) {
       command.stamp = now - std::chrono::milliseconds(60);
       ++command.sequence;
@@ -77,17 +143,24 @@ struct Drive {
     }
   }
 
-  Drive() {
-    feedback.operator_enable = feedback.autonomy_enabled = true;
-    status.operator_key = true;
-    command.speed = 3.0;
-    command.acceleration = 0.8;
-    command.mode = Mode::kAutonomous;
+  // As the truck, on this bus.
+  void say(can::Frame frame) {
+    if (kind == BusKind::kJ1939OnSocketCan) {
+      for (const can::J1939Group& group : can::j1939Groups()) {
+        if (group.id != frame.id) continue;
+        frame.id = can::toIdentifier({group.priority, group.pgn, can::kGlobalAddress, kTruck});
+        frame.extended = true;
+        break;
+      }
+    }
+    wire.give(can::Received::Kind::kFrame, frame);
   }
 
-  FixedBus bus;
+  BusKind kind;
+  Wire wire;
+  std::unique_ptr<can::Bus> bus;
   CanBridge bridge{loadBridge(config::loadFile(file("can_bridge.yaml"))),
-                   vehicle::loadTruck(file("truck.yaml")).geometry, bus};
+                   vehicle::loadTruck(file("truck.yaml")).geometry, *bus};
   can::TruckFeedbackFrame feedback;
   can::TruckMotionFrame motion;
   can::TruckStatusFrame status;
@@ -100,7 +173,7 @@ struct Drive {
 };
 
 // Armed: engaged by an operator, not yet driving.
-struct BridgeAllocation : testing::Test {
+struct BridgeAllocation : testing::TestWithParam<BusKind> {
   void SetUp() override {
     SKIP_WHERE_ALLOCATIONS_ARE_NOT_COUNTED();
     ASSERT_EQ(allocationsOfOne(), 1);
@@ -116,10 +189,13 @@ struct BridgeAllocation : testing::Test {
     ASSERT_EQ(state(), SafetyState::kActive);
   }
 
-  Drive drive;
+  Drive drive{GetParam()};
 };
+INSTANTIATE_TEST_SUITE_P(Buses, BridgeAllocation,
+                         testing::Values(BusKind::kBare, BusKind::kSocketCan,
+                                         BusKind::kJ1939OnSocketCan));
 
-TEST_F(BridgeAllocation, NoneFromArmedOnWhileItDrives) {
+TEST_P(BridgeAllocation, NoneFromArmedOnWhileItDrives) {
   EXPECT_EQ(allocationsOf([&] {
               getUnderWay();
               drive.cycles(3000);
@@ -128,7 +204,7 @@ TEST_F(BridgeAllocation, NoneFromArmedOnWhileItDrives) {
   EXPECT_EQ(state(), SafetyState::kActive);
 }
 
-TEST_F(BridgeAllocation, NoneWhenItDegradesAndRecovers) {
+TEST_P(BridgeAllocation, NoneWhenItDegradesAndRecovers) {
   getUnderWay();
   EXPECT_EQ(allocationsOf([&] {
               drive.command.reason = Reason::kLowConfidence;
@@ -141,7 +217,7 @@ TEST_F(BridgeAllocation, NoneWhenItDegradesAndRecovers) {
   EXPECT_EQ(state(), SafetyState::kActive);
 }
 
-TEST_F(BridgeAllocation, NoneInAStopWithoutAnArbiter) {
+TEST_P(BridgeAllocation, NoneInAStopWithoutAnArbiter) {
   getUnderWay();
   EXPECT_EQ(allocationsOf([&] {
               drive.arbiter_alive = false;
@@ -154,7 +230,7 @@ TEST_F(BridgeAllocation, NoneInAStopWithoutAnArbiter) {
   EXPECT_EQ(state(), SafetyState::kStopped);
 }
 
-TEST_F(BridgeAllocation, NoneForCommandsThatAreRefused) {
+TEST_P(BridgeAllocation, NoneForCommandsThatAreRefused) {
   getUnderWay();
   Command bad = drive.command;
   EXPECT_EQ(allocationsOf([&] {
@@ -168,13 +244,13 @@ TEST_F(BridgeAllocation, NoneForCommandsThatAreRefused) {
   EXPECT_EQ(drive.bridge.status().commands_rejected, 20u);
 }
 
-TEST_F(BridgeAllocation, NoneForFramesThatAreCorrupt) {
+TEST_P(BridgeAllocation, NoneForFramesThatAreCorrupt) {
   getUnderWay();
   EXPECT_EQ(allocationsOf([&] {
               can::Frame corrupt = *can::encode(drive.feedback);
               corrupt.data[3] ^= 0x10;
               for (int i = 0; i < 5; ++i) {
-                drive.bus.give(corrupt);
+                drive.say(corrupt);
                 drive.cycles(1);
               }
             }),

@@ -97,6 +97,15 @@ TEST_F(CanMachine, DrivesWithEveryFrameConfirmed) {
   row.print("none");
 }
 
+TEST_F(CanMachine, TakesNothingFromTheHeapOnceItDrives) {
+  ASSERT_TRUE(pilot->drive()) << toString(pilot->state()) << " " << pilot->bus->trouble();
+  EXPECT_GT(pilot->allocations, 0) << "the bus tells its trouble at the start, so the counter counts";
+  pilot->allocations = 0;
+  pilot->run(times(3, 60));
+  EXPECT_EQ(pilot->state(), SafetyState::kActive);
+  EXPECT_EQ(pilot->allocations, 0);
+}
+
 TEST_F(CanMachine, BusOff) {
   for (int i = 0; i < times(5, 1000) && !HasFatalFailure(); ++i) {
     expectStop([] { provoke("bus_off"); });

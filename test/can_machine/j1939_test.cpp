@@ -127,8 +127,10 @@ TEST_F(CanMachineJ1939, ClaimsBeforeAllElseAndDrives) {
   const Stamp begin = steadyTime();
   start();
   ASSERT_TRUE(pilot->drive()) << tale();
+  pilot->allocations = 0;
   pilot->run(times(2, 30));
   EXPECT_EQ(pilot->state(), SafetyState::kActive);
+  EXPECT_EQ(pilot->allocations, 0);
   const auto claim = claimed(own.name, begin);
   ASSERT_TRUE(claim);
   for (const auto& [stamp, frame] : recorder.since(begin)) {

@@ -12,6 +12,7 @@
 #include <fstream>
 #include <stdexcept>
 
+#include "../allocations.h"
 #include "tunnel_pilot/can/layout.h"
 #include "tunnel_pilot/simulation/truck_controller.h"
 
@@ -143,9 +144,9 @@ void Pilot::step() {
     command.source = supervision::Source::kPreviewDriver;
     command.acceleration = 0.5;
     event("measurement preview_driver 0", now);
-    bridge->setCommand(command, now);
+    allocations += allocationsOf([&] { bridge->setCommand(command, now); });
   }
-  bridge->tick(now);
+  allocations += allocationsOf([&] { bridge->tick(now); });
   look(now);
 }
 

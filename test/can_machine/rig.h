@@ -89,6 +89,7 @@ class Pilot {
   std::unique_ptr<can::Bus> network;  ///< as the bridge has it
   std::unique_ptr<CanBridge> bridge;
   Stamp stopped_at{};  ///< the tick that stopped
+  long allocations = 0;  ///< of bridge and bus, in commands and ticks
   bool engaged_by_us = false;
   bool armed_by_itself = false;
 
