@@ -29,9 +29,14 @@ TEST_F(TickTimeTest, BeginsAtZeroWithAStepThatCountsAsNone) {
 
 TEST_F(TickTimeTest, EvenStepsCountInFull) { EXPECT_EQ(after({10, 10, 10}), milliseconds(30)); }
 
-TEST_F(TickTimeTest, AJumpAheadCountsAsTheStepBeforeIt) {
-  EXPECT_EQ(after({3600000, 10}), milliseconds(20));
-  EXPECT_EQ(after({12, 10}), milliseconds(20));
+TEST_F(TickTimeTest, CallsInBetweenCountInFull) {
+  EXPECT_EQ(after({3, 7, 10, 1, 1, 8, 10}), milliseconds(40));
+}
+
+TEST_F(TickTimeTest, AJumpAheadCountsAsTheLongestStepBeforeIt) {
+  EXPECT_EQ(after({3600000}), milliseconds(10));
+  EXPECT_EQ(after({12}), milliseconds(10));
+  EXPECT_EQ(after({3, 3600000}), milliseconds(13));
 }
 
 TEST_F(TickTimeTest, AJumpBackCountsAsNoneAndTheStepsAfterItInFull) {
@@ -41,6 +46,14 @@ TEST_F(TickTimeTest, AJumpBackCountsAsNoneAndTheStepsAfterItInFull) {
 TEST_F(TickTimeTest, AnotherRhythmCountsInFullFromItsSecondStep) {
   EXPECT_EQ(after({20, 20, 20}), milliseconds(50));
   EXPECT_EQ(after({5, 5, 5}), milliseconds(15));
+}
+
+TEST_F(TickTimeTest, ARhythmSlowerThan25MillisecondsCountsAsThat) {
+  EXPECT_EQ(after({40, 40, 40}), milliseconds(60));
+}
+
+TEST_F(TickTimeTest, AJumpIsForgottenAfterEightSteps) {
+  EXPECT_EQ(after({3600000, 10, 10, 10, 10, 10, 10, 10, 10, 3600000}), milliseconds(100));
 }
 
 }  // namespace
