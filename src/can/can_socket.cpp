@@ -15,10 +15,9 @@
 #include <cerrno>
 #include <cstring>
 #include <stdexcept>
+#include <string_view>
 
 #include "tunnel_pilot/can/linux_frame.h"
-
-extern char** environ;
 
 namespace tunnel_pilot::can {
 namespace {
@@ -96,7 +95,8 @@ void readLinkInfo(const void* data, int length, CanLink& link) {
   const auto* first = static_cast<const rtattr*>(data);
   forEachAttribute(first, length, [&](int type, const void* value, int size) {
     if (type == IFLA_INFO_KIND) {
-      link.controller = std::strncmp(static_cast<const char*>(value), "can", 4) == 0 && size >= 3;
+      const std::string_view kind(static_cast<const char*>(value), static_cast<std::size_t>(size));
+      link.controller = kind.substr(0, kind.find('\0')) == "can";
     }
   });
   if (!link.controller) return;
@@ -178,6 +178,7 @@ can_filter filterOf(const Identifier& identifier) {
 /// 0 or errno. Everything is set before the socket is bound: it never hears what it shall not.
 int setUp(int number, const std::vector<Identifier>& listen, int index) {
   std::vector<can_filter> filters;
+  filters.reserve(listen.size());
   for (const Identifier& identifier : listen) filters.push_back(filterOf(identifier));
   const int on = 1;
   sockaddr_can address{};
