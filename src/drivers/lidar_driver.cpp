@@ -94,8 +94,8 @@ void LidarInputs::fillMirrored(float* inputs) const {
 template <typename Iterator>
 void LidarInputs::write(Iterator first, Iterator last, const TruckInputs& truck, float* inputs) const {
   for (const InputGroup& group : groups_) {
-    if (group.meaning != "ranges") {
-      *inputs++ = static_cast<float>(group.scaled(truck.*memberOf(group.meaning)));
+    if (double TruckInputs::*const member = memberOf(group.meaning)) {
+      *inputs++ = static_cast<float>(group.scaled(truck.*member));
       continue;
     }
     const auto scale = static_cast<float>(group.scale);

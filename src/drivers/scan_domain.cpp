@@ -69,6 +69,7 @@ neural::InputDomain ScanDomain::fit(const std::vector<Features>& examples) {
     }
   }
   std::vector<double> distances;
+  distances.reserve(examples.size());
   const ScanDomain fitted(domain, "fit");
   for (const Features& example : examples) distances.push_back(fitted.distance(example));
   const auto last = static_cast<std::ptrdiff_t>(kQuantile * (count - 1.0));

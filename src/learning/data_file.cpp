@@ -217,7 +217,7 @@ DataSet readDataSet(const std::string& file) {
     examples.push_back(decode(record));
     if (!fault.empty()) continue;
     fault = faultOf(examples.back());
-    if (!fault.empty()) fault = ": example " + std::to_string(i) + " " + fault;
+    if (!fault.empty()) fault.insert(0, ": example " + std::to_string(i) + " ");
   }
   if (hash.finish() != header.hash) {
     throw ConfigError(file + ": 'sha256' is not that of its examples: the file is damaged");
