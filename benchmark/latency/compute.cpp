@@ -78,7 +78,7 @@ void run() {
   const ros::Subscriber scans = nh.subscribe<sensor_msgs::LaserScan>(
       "scan_in", 1, answer, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay());
   while (ros::ok()) {
-    ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.002));
+    ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.005));
     stages.rest();
   }
 }

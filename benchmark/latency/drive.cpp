@@ -141,19 +141,20 @@ class Drive {
       note(waiting.event, waiting.scan.header.stamp, sent);
   }
 
-  void onPilotCommand(const TruckCommand& command) {
-    const ros::Time received = ros::Time::now();
+  // A command was received when it was read off the socket.
+  void onPilotCommand(const ros::MessageEvent<const TruckCommand>& event) {
+    const TruckCommand& command = *event.getConstMessage();
     if (command.header.stamp == answered_ || command.stop) return;
     answered_ = command.header.stamp;
     if (!measuring_ || command.mode != TruckCommand::MODE_AUTONOMOUS) return;
     if (command.source == TruckCommand::SOURCE_PREVIEW_DRIVER)
-      note("preview_received", answered_, received);
-    if (command.source == TruckCommand::SOURCE_LIDAR_DRIVER) note("lidar_received", answered_, received);
+      note("preview_received", answered_, event.getReceiptTime());
+    if (command.source == TruckCommand::SOURCE_LIDAR_DRIVER)
+      note("lidar_received", answered_, event.getReceiptTime());
   }
 
-  void onPeerCommand(const TruckCommand& command) {
-    const ros::Time received = ros::Time::now();
-    if (measuring_) note("peer_received", command.header.stamp, received);
+  void onPeerCommand(const ros::MessageEvent<const TruckCommand>& event) {
+    if (measuring_) note("peer_received", event.getConstMessage()->header.stamp, event.getReceiptTime());
   }
 
   void note(const char* event, ros::Time scan, ros::Time at) {
