@@ -2,6 +2,7 @@
 """Makes a table of what latency.launch left in a folder, and the rows that scripts/benchmark judges.
 usage: report.py FOLDER [--json FILE]"""
 import json
+import statistics
 import sys
 from collections import Counter, defaultdict
 from pathlib import Path
@@ -9,6 +10,9 @@ from pathlib import Path
 NODES = 5  # of the peer
 PILOTS = {'preview': 'preview_driver steers', 'lidar': 'lidar_driver steers'}
 PEERS = {'peer': 'five nodes, usual settings', 'light': 'five nodes, light settings'}
+
+WAYS = {'preview': ['pilot_arrived', 'points', 'walls', 'tunnel_state', 'preview_proposal', 'pilot_published'],
+        'lidar': ['pilot_arrived', 'points', 'lidar_proposal', 'pilot_published']}
 
 
 def read(folder):
@@ -67,6 +71,14 @@ def measured(events):
     return times
 
 
+def ways(events):
+    """Where the time goes: from one message's publication to the next."""
+    for who, way in WAYS.items():
+        hops = (statistics.median(between(events, events[f'{who}_received'], *hop)) for hop in zip(way, way[1:]))
+        steps = ''.join(f' → {median:.0f} → {event}' for median, event in zip(hops, way[1:]))
+        yield f'{PILOTS[who]}, medians: {way[0]}{steps}'
+
+
 def rows(times):
     for kind in ('inside', 'outside'):
         for who, what in PILOTS.items():
@@ -96,6 +108,7 @@ events = read(folder)
 times = measured(events)
 print('| [us] | scans | median | p99 | worst |\n|---|---|---|---|---|')
 print('\n'.join(str(row) for row in times.values()))
+print('\n' + '\n\n'.join(ways(events)))
 print(f'\nScans without a command: {", ".join(lost(events))}.')
 if sys.argv[2:3] == ['--json']:
     Path(sys.argv[3]).write_text(
