@@ -109,7 +109,7 @@ times = measured(events)
 print('| [us] | scans | median | p99 | worst |\n|---|---|---|---|---|')
 print('\n'.join(str(row) for row in times.values()))
 print('\n' + '\n\n'.join(ways(events)))
-print(f'\nScans without a command: {", ".join(lost(events))}.')
+print(f'\nScans without a command: {", ".join(lost(events))}. Stops of the truck: {len(events.get("stop", ()))}.')
 if sys.argv[2:3] == ['--json']:
     Path(sys.argv[3]).write_text(
         json.dumps({'work': 'latency', 'rows': list(rows(times)), 'counted': [], 'missing': []}))
