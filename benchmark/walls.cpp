@@ -3,13 +3,8 @@
 // The drift has bends of 12 to 16 m radius and rough walls; every method is asked for the tunnel's
 // direction beside the front axle, and its error there is told beside its time.
 
-#include <pcl/ModelCoefficients.h>
-#include <pcl/filters/extract_indices.h>
-#include <pcl/filters/statistical_outlier_removal.h>
-#include <pcl/filters/voxel_grid.h>
 #include <pcl/search/kdtree.h>
 #include <pcl/segmentation/extract_clusters.h>
-#include <pcl/segmentation/sac_segmentation.h>
 
 #include <algorithm>
 #include <cmath>
@@ -23,6 +18,7 @@
 #include <vector>
 
 #include "harness.h"
+#include "pcl_chain.h"
 #include "tunnel_pilot/perception/centerline.h"
 #include "tunnel_pilot/perception/scan_filter.h"
 #include "tunnel_pilot/perception/wall_segmentation.h"
@@ -31,7 +27,8 @@
 namespace {
 
 using namespace tunnel_pilot;
-using Cloud = pcl::PointCloud<pcl::PointXYZ>;
+using benchmark::Cloud;
+using benchmark::PclSettings;
 using geometry::Point;
 using geometry::Pose;
 
@@ -168,48 +165,15 @@ Cloud::Ptr cloudOf(const geometry::Scan& scan) {
 // Direction of a line, taken ahead [rad].
 double ahead(double x, double y) { return x < 0.0 ? std::atan2(-y, -x) : std::atan2(y, x); }
 
-// What PCL's chain costs hangs on these two.
-struct PclSettings {
-  float leaf;     // of the voxel grid [m]
-  int neighbors;  // that the outlier removal looks at
-};
-constexpr PclSettings kTutorial{0.05F, 50};  // the neighbours as in PCL's own tutorial: its usual use
-constexpr PclSettings kLight{0.1F, 10};      // about the least that does the work
-
 // Voxel grid, statistical outlier removal, two lines by RANSAC, clusters of what is left.
 double pclChain(const Sample& sample, const PclSettings& settings) {
-  Cloud::Ptr cloud = cloudOf(sample.scan);
-  pcl::VoxelGrid<pcl::PointXYZ> voxels;
-  voxels.setInputCloud(cloud);
-  voxels.setLeafSize(settings.leaf, settings.leaf, settings.leaf);
-  Cloud::Ptr thinned(new Cloud);
-  voxels.filter(*thinned);
-  pcl::StatisticalOutlierRemoval<pcl::PointXYZ> outliers;
-  outliers.setInputCloud(thinned);
-  outliers.setMeanK(settings.neighbors);
-  outliers.setStddevMulThresh(1.0);
-  Cloud::Ptr rest(new Cloud);
-  outliers.filter(*rest);
+  Cloud::Ptr rest =
+      benchmark::withoutOutliers(benchmark::thinned(cloudOf(sample.scan), settings), settings);
   double heading = 0.0;
   for (int wall = 0; wall < 2; ++wall) {
-    pcl::SACSegmentation<pcl::PointXYZ> lines;
-    lines.setModelType(pcl::SACMODEL_LINE);
-    lines.setMethodType(pcl::SAC_RANSAC);
-    lines.setDistanceThreshold(0.15);
-    lines.setMaxIterations(100);
-    lines.setInputCloud(rest);
-    pcl::PointIndices::Ptr inliers(new pcl::PointIndices);
-    pcl::ModelCoefficients line;
-    lines.segment(*inliers, line);
-    if (inliers->indices.empty()) return std::nan("");
-    heading += 0.5 * ahead(line.values[3], line.values[4]);
-    pcl::ExtractIndices<pcl::PointXYZ> extract;
-    extract.setInputCloud(rest);
-    extract.setIndices(inliers);
-    extract.setNegative(true);
-    Cloud::Ptr left_over(new Cloud);
-    extract.filter(*left_over);
-    rest = left_over;
+    const auto line = benchmark::takeLine(rest);
+    if (!line) return std::nan("");
+    heading += 0.5 * ahead(line->values[3], line->values[4]);
   }
   pcl::search::KdTree<pcl::PointXYZ>::Ptr tree(new pcl::search::KdTree<pcl::PointXYZ>);
   if (!rest->empty()) {
@@ -300,8 +264,8 @@ int main(int argc, char** argv) {
   Ours ours;
   const std::vector<std::pair<std::string, std::function<double(const Sample&)>>> methods = {
       {"ours", [&](const Sample& s) { return ours.heading(s); }},
-      {"PCL chain", [](const Sample& s) { return pclChain(s, kTutorial); }},
-      {"PCL chain, light settings", [](const Sample& s) { return pclChain(s, kLight); }},
+      {"PCL chain", [](const Sample& s) { return pclChain(s, benchmark::kTutorial); }},
+      {"PCL chain, light settings", [](const Sample& s) { return pclChain(s, benchmark::kLight); }},
       {"OpenCV HoughLinesP", houghLines},
       {"OpenCV fitLine (Huber)", fitLines}};
   benchmark::Contest contest("scan to tunnel heading", argc, argv);
