@@ -89,7 +89,8 @@ class Cook {
   void sample() {
     for (std::size_t s = 0; s < recipe_.scenes.size(); ++s) {
       const SceneSource& source = recipe_.scenes[s];
-      const auto all = static_cast<std::size_t>(source.tunnels + recipe_.held_out);
+      const auto all =
+          static_cast<std::size_t>(source.tunnels) + static_cast<std::size_t>(recipe_.held_out);
       std::vector<DataSet> sets(all);
       inParallel(all, jobs_, [&](std::size_t i) {
         const std::uint64_t seed = recipe_.seed + kSeedsOfASource * s + i;

@@ -23,12 +23,7 @@ class Weave {
  public:
   Weave(double largest, std::uint64_t seed) {
     simulation::Random random(seed, simulation::Stream::kWander);
-    const double lengths[2][2] = {{30.0, 60.0}, {15.0, 25.0}};
-    const double shares[2] = {0.6, 0.4};
-    for (std::size_t i = 0; i < waves_.size(); ++i) {
-      waves_[i] = {largest * shares[i], 2.0 * M_PI / random.uniform(lengths[i][0], lengths[i][1]),
-                   random.uniform(0.0, 2.0 * M_PI)};
-    }
+    waves_ = {drawn(0.6 * largest, 30.0, 60.0, random), drawn(0.4 * largest, 15.0, 25.0, random)};
   }
   double at(double s) const {
     double sum = 0.0;
@@ -40,6 +35,9 @@ class Weave {
   struct Wave {
     double height, number, phase;
   };
+  static Wave drawn(double height, double shortest, double longest, simulation::Random& random) {
+    return {height, 2.0 * M_PI / random.uniform(shortest, longest), random.uniform(0.0, 2.0 * M_PI)};
+  }
   std::array<Wave, 2> waves_{};
 };
 

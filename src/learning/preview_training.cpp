@@ -106,6 +106,7 @@ Judgement judge(std::vector<Course>& courses, const NetworkFile& network,
   for (Course& course : courses) {
     give(course, network, {false, 0.0, 0.0, 0.0});
     std::vector<simulation::EpisodePlan> plans;
+    plans.reserve(static_cast<std::size_t>(options.validation_drives));
     for (int i = 0; i < options.validation_drives; ++i) {
       plans.push_back({options.validation_seed + static_cast<std::uint64_t>(i), false});
     }
