@@ -103,6 +103,15 @@ TEST(ArbiterEdge, TwoDriversThatLackTheTunnelAreExcusedBoth) {
   }
 }
 
+TEST(ArbiterEdge, ADriverThatIsUnableInAValidTunnelIsNotExcused) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.proposal_valid = false;
+  const Decision& decision = bench.cycle();
+  EXPECT_TRUE(decision.command.stop);
+  EXPECT_EQ(decision.command.reason, Reason::kNoSource);
+}
+
 // ---- an order of inputs that is not the usual one
 
 TEST(ArbiterEdge, MotionThatNeverWasANumberIsNotWaitedFor) {
