@@ -216,9 +216,8 @@ TEST(Envelope, ACommandIntoTheWallIsSeenBeforeItHappens) {
   EXPECT_LT(away, check.of(straightScene(0.0)).clearance_left - 0.3);
 }
 
-TEST(Envelope, RemembersTheWallsBesideTheTruck) {
-  // The wall comes nearer beside the rear body, where the lidar at the nose no longer looks.
-  Check check;
+// The left wall comes nearer beside the rear body, where the lidar at the nose no longer looks.
+void passANarrowPlace(Check& check) {
   for (double x = 0.0; x <= 8.0; x += 0.25) {
     check.odom = {x, 0.0, 0.0};
     Scene scene = straightScene(0.0);
@@ -227,9 +226,32 @@ TEST(Envelope, RemembersTheWallsBesideTheTruck) {
     }
     check.of(scene);
   }
+}
+
+TEST(Envelope, RemembersTheWallsBesideTheTruck) {
+  Check check;
+  passANarrowPlace(check);
   EXPECT_NEAR(check.envelope.result().clearance_left, 2.5 - 0.5 - kHalfTruck, 0.05);
   check.envelope.reset();
   EXPECT_NEAR(check.of(straightScene(0.0)).clearance_left, 2.5 - kHalfTruck, 0.01);
+}
+
+TEST(Envelope, ATruckThatStandsForLongRemembersTheWallsBesideIt) {
+  Check check;
+  passANarrowPlace(check);
+  for (int scan = 0; scan < 1000; ++scan) check.of(straightScene(0.0));
+  EXPECT_NEAR(check.envelope.result().clearance_left, 2.5 - 0.5 - kHalfTruck, 0.05);
+}
+
+TEST(Envelope, AWallThatWasNotFoundIsNotRemembered) {
+  Check check;
+  for (double x = 0.0; x <= 3.0; x += 0.6) {
+    check.odom = {x, 0.0, 0.0};
+    Scene scene = straightScene(0.0);
+    scene.walls.left.found = false;
+    check.of(scene);
+  }
+  EXPECT_TRUE(std::isnan(check.envelope.result().clearance_left));
 }
 
 TEST(Envelope, AGapInAWallIsNotBridged) {
