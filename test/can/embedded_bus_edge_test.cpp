@@ -115,7 +115,7 @@ class EmbeddedBusEdge : public testing::Test {
 
 TEST_F(EmbeddedBusEdge, WithoutARuntimeFolderOfItsUserItLivesInTmp) {
   const std::string tmp = "/tmp/tunnel_pilot_can." + std::to_string(geteuid());
-  for (const char* runtime : {"", "relative", "/no/such/folder"}) {
+  for (const char* runtime : {"", ".", "/no/such/folder"}) {
     setenv("XDG_RUNTIME_DIR", runtime, 1);
     EXPECT_EQ(EmbeddedBus("edge_test").folder(), tmp + "/edge_test") << runtime;
   }

@@ -137,7 +137,7 @@ TEST(Envelope, WhatStandsBehindTheTailIsNoObstacle) {
   addObstacle(scene, -6.5, 0.0, 0.8);
   ASSERT_EQ(check.of(scene).free_until, Envelope::End::kObstacle) << "beside the tail it is one";
   scene = straightScene(0.0);
-  addObstacle(scene, -9.0, 0.0, 0.8);
+  addObstacle(scene, -7.5, 0.0, 0.8);
   EXPECT_EQ(check.of(scene).free_until, Envelope::End::kSight);
 }
 
@@ -157,6 +157,32 @@ TEST(Envelope, ARoughWallWithinTheMarginIsNoObstacle) {
   for (auto& p : scene.walls.left.curve) p.y() = kHalfTruck + margin + 0.03;
   for (const double x : {7.0, 7.15, 7.3}) scene.points.push_back({x, kHalfTruck + margin - 0.03});
   EXPECT_EQ(check.of(scene).free_until, Envelope::End::kWall);
+}
+
+TEST(Envelope, AnObstacleThatTouchesTheRoughWallIsOne) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  const double margin = check.parameters.envelope.margin;
+  for (auto& p : scene.walls.left.curve) p.y() = kHalfTruck + margin + 0.03;
+  for (const double y : {1.3, 1.45, 1.6}) scene.points.push_back({7.0, y});
+  EXPECT_EQ(check.of(scene).free_until, Envelope::End::kObstacle);
+}
+
+TEST(Envelope, ReturnsThatStandApartByTheSmallestObstacleAreNotOne) {
+  Check check;
+  check.parameters.envelope.smallest_obstacle = 0.5;
+  check.envelope = Envelope(check.parameters.envelope, check.parameters.limiter, check.truck);
+  Scene scene = straightScene(0.0);
+  for (const double y : {-0.5, 0.0, 0.5}) scene.points.push_back({7.0, y});
+  EXPECT_EQ(check.of(scene).free_until, Envelope::End::kSight);
+}
+
+TEST(Envelope, DustBeforeAnObstacleDoesNotBringItNearer) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  scene.points.push_back({4.0, 0.0});
+  addObstacle(scene, 9.0, 0.0, 0.8);
+  EXPECT_NEAR(check.of(scene).free_distance, 9.0 - check.truck.front_overhang, 0.05);
 }
 
 // Where the way ends that a truck takes with a held articulation, left of where it points to [m].
