@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "arbiter_bench.h"
+#include "tunnel_pilot/vehicle/articulation.h"
 
 // What an ordinary drive never shows: inputs that come in an odd order or not at all, tables without
 // walls or with sources that do not steer.
@@ -219,6 +220,28 @@ TEST(ArbiterEdge, ACenterlineTooOldForDeadReckoningHolds) {
   EXPECT_EQ(bench.cycles(10).command.source, Source::kHold);
 }
 
+TEST(ArbiterEdge, AfterAClockJumpMotionIsWaitedForAsAtTheStart) {
+  ArbiterBench bench;
+  bench.cycles(5);
+  bench.arbiter->clockJumped();
+  bench.give_motion = false;
+  EXPECT_EQ(bench.cycle().command.reason, Reason::kStartUp);
+}
+
+// Where the corridor's left edge ends of a truck in a bend, which turns by this share of what its hinge
+// says.
+double endOfCorridor(double share) {
+  ArbiterBench bench;
+  bench.wanted = bench.motion.articulation = 0.2;
+  bench.motion.yaw_rate = share * vehicle::yawRate(bench.truck.geometry, 3.0, 0.2, 0.0);
+  bench.drive();
+  return bench.cycles(100).corridor_left.back().y();
+}
+
+TEST(ArbiterEdge, ATruckSeenToTurnLessThanItsHingeIsExpectedToGoWider) {
+  EXPECT_LT(endOfCorridor(0.8), endOfCorridor(1.0) - 0.05);
+}
+
 // ---- what stops, and for how long
 
 TEST(ArbiterEdge, WhereTheTruckHasNoStatesStartingUpIsNoLatchedStop) {
@@ -239,6 +262,20 @@ TEST(ArbiterEdge, AtRestAResetIsRefusedWhileSomethingStops) {
   bench.give_proposal = false;
   EXPECT_TRUE(bench.cycles(20).command.stop);
   EXPECT_FALSE(bench.arbiter->reset(bench.now));
+}
+
+TEST(ArbiterEdge, WithoutWallChecksAScanThatStaysAwayStopsAllTheSame) {
+  ArbiterBench bench;
+  bench.parameters.wall_checks = false;
+  startAnew(bench);
+  bench.drive();
+  bench.give_scan = false;
+  bench.latency = Stamp::zero();  // a driver that needs none
+  const int cycles = static_cast<int>(bench.parameters.scan_stop_age / 0.02);
+  EXPECT_FALSE(bench.cycles(cycles - 5).command.stop);
+  const Decision& decision = bench.cycles(6);
+  EXPECT_TRUE(decision.command.stop);
+  EXPECT_EQ(decision.command.reason, Reason::kScanStale);
 }
 
 TEST(ArbiterEdge, AClockThatJumpsWhileNobodyIsEngagedLatchesNothing) {
