@@ -242,6 +242,29 @@ TEST(ArbiterEdge, ATruckSeenToTurnLessThanItsHingeIsExpectedToGoWider) {
   EXPECT_LT(endOfCorridor(0.8), endOfCorridor(1.0) - 0.05);
 }
 
+TEST(ArbiterEdge, AHeldArticulationIsOfTheTimeOfTheLastMotionAndWithoutAnyOfNone) {
+  ArbiterBench bench;
+  EXPECT_EQ(bench.arbiter->decide(bench.now).command.stamp, Stamp{});
+  bench.give_proposal = bench.give_scan = false;
+  const Command& command = bench.cycle().command;
+  ASSERT_EQ(command.source, Source::kHold);
+  EXPECT_EQ(command.stamp, bench.now);
+}
+
+TEST(ArbiterEdge, DeadReckoningSteersFromWhereTheTruckIsOnceTheSteeringAnswers) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.tunnel_valid = bench.proposal_valid = false;
+  bench.motion.yaw_rate = 0.05;
+  const Decision& decision = bench.cycles(20);
+  ASSERT_EQ(decision.command.source, Source::kDeadReckoning);
+  const geometry::Pose ahead = drivers::advanced(
+      geometry::Pose(), 3.0, 0.05, bench.truck.steering.dead_time + bench.truck.steering.lag);
+  const drivers::PathFollowerGains& gains = bench.parameters.envelope.follower;
+  EXPECT_NEAR(decision.command.articulation_angle,
+              -gains.offset * ahead.y - gains.heading * ahead.heading, 1e-4);
+}
+
 // ---- what stops, and for how long
 
 TEST(ArbiterEdge, WhereTheTruckHasNoStatesStartingUpIsNoLatchedStop) {
