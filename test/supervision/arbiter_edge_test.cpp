@@ -249,6 +249,34 @@ TEST(ArbiterEdge, AHeldArticulationIsOfTheTimeOfTheLastMotionAndWithoutAnyOfNone
   const Command& command = bench.cycle().command;
   ASSERT_EQ(command.source, Source::kHold);
   EXPECT_EQ(command.stamp, bench.now);
+  bench.arbiter->clockJumped();
+  EXPECT_EQ(bench.arbiter->decide(bench.now).command.stamp, Stamp{});
+}
+
+TEST(ArbiterEdge, BetweenScansTheWayDrivenShortensTheFreeOneDownToNothing) {
+  ArbiterBench bench;
+  bench.obstacle = 8.0;
+  bench.drive();
+  const double free = bench.cycle().free_distance;
+  bench.give_scan = false;
+  EXPECT_NEAR(bench.cycles(10).free_distance, free - 10 * 3.0 * 0.02, 1e-9);
+  EXPECT_EQ(bench.cycles(200).free_distance, 0.0);
+}
+
+TEST(ArbiterEdge, AScanFromBeforeTheMotionIsNotCompared) {
+  ArbiterBench bench;
+  bench.latency = milliseconds(500);
+  EXPECT_TRUE(std::isnan(bench.cycles(5).free_distance));
+}
+
+TEST(ArbiterEdge, AnObstacleWithinTheReserveStopsATruckThatStands) {
+  for (const double beyond : {-0.1, 0.1}) {
+    ArbiterBench bench;
+    bench.motion.speed = 0.0;
+    bench.obstacle = bench.truck.geometry.front_overhang + bench.parameters.envelope.reserve + beyond;
+    bench.drive();
+    EXPECT_EQ(bench.cycle().command.stop, beyond < 0.0) << beyond;
+  }
 }
 
 TEST(ArbiterEdge, DeadReckoningSteersFromWhereTheTruckIsOnceTheSteeringAnswers) {
