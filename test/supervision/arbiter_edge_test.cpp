@@ -329,6 +329,55 @@ TEST(ArbiterEdge, WithoutWallChecksAScanThatStaysAwayStopsAllTheSame) {
   EXPECT_EQ(decision.command.reason, Reason::kScanStale);
 }
 
+TEST(ArbiterEdge, AnObstacleIsToldAsOneAmongScansThatShowTooLittleRoom) {
+  ArbiterBench bench;
+  bench.parameters.wall_scans = 2;
+  startAnew(bench);
+  bench.drive();
+  bench.narrow = 3.0;
+  bench.cycle();
+  bench.narrow.reset();
+  bench.obstacle = 3.0;
+  const Decision& decision = bench.cycle();
+  EXPECT_TRUE(decision.command.stop);
+  EXPECT_EQ(decision.command.reason, Reason::kObstacle);
+}
+
+TEST(ArbiterEdge, ATruckThatWaitsForAFreeWayIsHeldByNoSource) {
+  ArbiterBench bench;
+  bench.motion.speed = 0.0;
+  bench.obstacle = bench.truck.geometry.front_overhang + bench.parameters.envelope.reserve + 0.1;
+  bench.drive();
+  bench.obstacle.reset();
+  const Decision& decision = bench.cycles(10);
+  EXPECT_EQ(decision.limited_by, SpeedLimit::kObstacle);
+  EXPECT_EQ(decision.speed_source, Source::kNone);
+}
+
+TEST(ArbiterEdge, ATruckOfWhichNoMotionIsKnownIsTakenToStand) {
+  ArbiterBench bench;
+  EXPECT_EQ(bench.arbiter->decide(bench.now).command.speed, 0.0);
+}
+
+TEST(ArbiterEdge, APauseOfTheClockUpToItsLimitIsNoJump) {
+  ArbiterBench bench;
+  bench.drive();
+  const Stamp later = bench.now + fromSeconds(bench.parameters.clock_jump);
+  EXPECT_NE(bench.arbiter->decide(later).command.reason, Reason::kClockJump);
+}
+
+TEST(ArbiterEdge, AStopOutlastsTheTrucksResetByTheRecoveryTime) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.proposal_valid = false;
+  ASSERT_TRUE(bench.cycle().command.stop);
+  bench.proposal_valid = true;
+  bench.state = {false, false, Reason::kNotEngaged};
+  const int cycles = static_cast<int>(bench.parameters.recovery_time / 0.02);
+  EXPECT_TRUE(bench.cycles(cycles - 1).command.stop);
+  EXPECT_FALSE(bench.cycles(5).command.stop);
+}
+
 TEST(ArbiterEdge, AClockThatJumpsWhileNobodyIsEngagedLatchesNothing) {
   ArbiterBench bench;
   bench.cycles(10);
