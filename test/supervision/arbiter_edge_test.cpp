@@ -354,11 +354,6 @@ TEST(ArbiterEdge, ATruckThatWaitsForAFreeWayIsHeldByNoSource) {
   EXPECT_EQ(decision.speed_source, Source::kNone);
 }
 
-TEST(ArbiterEdge, ATruckOfWhichNoMotionIsKnownIsTakenToStand) {
-  ArbiterBench bench;
-  EXPECT_EQ(bench.arbiter->decide(bench.now).command.speed, 0.0);
-}
-
 TEST(ArbiterEdge, APauseOfTheClockUpToItsLimitIsNoJump) {
   ArbiterBench bench;
   bench.drive();
