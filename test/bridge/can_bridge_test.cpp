@@ -156,6 +156,15 @@ TEST(CanBridgeRate, NeverSendsMoreThanSixteenFramesInAQuarterSecond) {
   EXPECT_TRUE(rig.judge.complaints.empty()) << rig.judge.complaints.front();
 }
 
+TEST(CanBridgeClock, AfterAJumpTheLinkProvesItsHealthAnewThoughTheNextTickHasAllFrames) {
+  Rig rig(0.025);
+  rig.run(1.5);
+  ASSERT_EQ(rig.state(), SafetyState::kStandby);
+  rig.bridge->clockJumped(rig.now);
+  rig.run(0.9);
+  EXPECT_EQ(rig.state(), SafetyState::kInit);
+}
+
 // -------- commands
 
 class RefusedCommand : public CanBridgeTest,
@@ -207,6 +216,31 @@ INSTANTIATE_TEST_SUITE_P(
                     [](Command& c, Stamp now) { c.stamp = now + ms(51); },
                     [](Command& c, Stamp) { c.sequence = 0; }));
 
+TEST_F(CanBridgeTest, TakesCommandsAtTheLimits) {
+  rig.run(1.5);
+  const BridgeParameters parameters = Rig::bridgeParameters();
+  for (const double side : {-1.0, 1.0}) {
+    Command command = rig.command;
+    command.sequence = 1u << 20;
+    command.stamp = rig.now;
+    command.articulation_angle = side * Rig::truckParameters().geometry.max_articulation;
+    command.speed = side < 0.0 ? 0.0 : parameters.max_speed;
+    command.acceleration = side < 0.0 ? 0.0 : parameters.max_acceleration;
+    rig.bridge->setCommand(command, rig.now);
+    EXPECT_EQ(rig.bridge->status().command_rejection, "");
+  }
+}
+
+TEST_F(CanBridgeTest, TakesACommandThatComesTwiceWhileDriving) {
+  rig.drive();
+  Command command = rig.command;
+  command.sequence = 1u << 20;
+  command.stamp = rig.now;
+  rig.bridge->setCommand(command, rig.now);
+  rig.bridge->setCommand(command, rig.now);
+  EXPECT_EQ(rig.bridge->status().commands_rejected, 0u);
+}
+
 TEST_F(CanBridgeTest, TakesAnArbiterThatStartedAgainOnlyWhenNotDriving) {
   rig.drive();
   rig.bridge->stop(rig.now);
@@ -251,6 +285,14 @@ TEST_F(CanBridgeTest, OperatorsStopIsOnTheBusWithinTheCallInEveryState) {
     EXPECT_TRUE(can::decode<can::TruckCommandFrame>(*frame)->stop);
     EXPECT_TRUE(isStop(other.state()));
   }
+}
+
+TEST_F(CanBridgeTest, OperatorsReleaseIsOnTheBusWithinTheCall) {
+  rig.drive();
+  rig.judge.stopAsked(rig.now);
+  rig.bridge->release(rig.now);
+  rig.pump();
+  EXPECT_TRUE(rig.judge.last->stop);
 }
 
 TEST_F(CanBridgeTest, ArbitersStopIsOnTheBusWithinTheCall) {

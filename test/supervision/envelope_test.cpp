@@ -168,6 +168,16 @@ TEST(Envelope, AnObstacleThatTouchesTheRoughWallIsOne) {
   EXPECT_EQ(check.of(scene).free_until, Envelope::End::kObstacle);
 }
 
+TEST(Envelope, AReturnThatStandsOffTheWallByItsRoughnessIsNotTheWalls) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  scene.tunnel.centerline = geometry::Path();  // the stations stand at whole metres
+  const double wall = kHalfTruck + check.parameters.envelope.margin + 0.03;
+  for (auto& p : scene.walls.left.curve) p.y() = wall;
+  scene.points = {{7.0, wall - 0.20}, {7.1, 1.65}, {7.2, 1.65}};
+  EXPECT_EQ(check.of(scene).free_until, Envelope::End::kObstacle);
+}
+
 TEST(Envelope, ReturnsThatStandApartByTheSmallestObstacleAreNotOne) {
   Check check;
   check.parameters.envelope.smallest_obstacle = 0.5;
