@@ -105,6 +105,11 @@ TEST_F(CanBridgeTest, DrivesTheTruckToTheCommandedSpeedAndArticulation) {
   EXPECT_TRUE(rig.bridge->status().autonomy_enabled);
 }
 
+TEST_F(CanBridgeTest, CountsTheChangesOfItsState) {
+  rig.drive();
+  EXPECT_EQ(rig.bridge->status().transitions, 3u) << "to STANDBY, ARMED and ACTIVE";
+}
+
 TEST_F(CanBridgeTest, RepeatsTheLastCommandEveryTwentyMilliseconds) {
   rig.drive();
   const std::size_t before = rig.judge.times.size();
