@@ -105,6 +105,25 @@ TEST_F(CanBridgeTest, DrivesTheTruckToTheCommandedSpeedAndArticulation) {
   EXPECT_TRUE(rig.bridge->status().autonomy_enabled);
 }
 
+TEST_F(CanBridgeTest, AStopKeepsItsCommandsModeAndAsksForNoSpeed) {
+  rig.run(1.5);
+  EXPECT_EQ(rig.judge.last->mode, static_cast<std::uint8_t>(supervision::Mode::kStandby));
+  rig.drive();
+  rig.bridge->stop(rig.now);
+  rig.run(0.1);
+  ASSERT_EQ(rig.state(), SafetyState::kStopping);
+  ASSERT_TRUE(rig.judge.last->steering_enable);
+  EXPECT_EQ(rig.judge.last->mode, static_cast<std::uint8_t>(supervision::Mode::kAutonomous));
+  EXPECT_EQ(rig.judge.last->speed, 0.0);
+  EXPECT_NEAR(rig.judge.last->acceleration, Rig::bridgeParameters().stop_deceleration, 0.01);
+}
+
+TEST_F(CanBridgeTest, BeforeAnyCommandItTellsItsOwnReason) {
+  rig.arbiter_alive = false;
+  rig.run(0.1);
+  EXPECT_EQ(rig.judge.last->reason, static_cast<std::uint8_t>(Reason::kStartUp));
+}
+
 TEST_F(CanBridgeTest, CountsTheChangesOfItsState) {
   rig.drive();
   EXPECT_EQ(rig.bridge->status().transitions, 3u) << "to STANDBY, ARMED and ACTIVE";

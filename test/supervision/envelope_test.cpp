@@ -279,6 +279,16 @@ TEST(Envelope, ATruckThatStandsForLongRemembersTheWallsBesideIt) {
   EXPECT_NEAR(check.envelope.result().clearance_left, 2.5 - 0.5 - kHalfTruck, 0.05);
 }
 
+TEST(Envelope, AfterAResetNothingOfTheWallsIsRemembered) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  for (auto& p : scene.walls.left.curve) p.y() = 1.6;
+  check.of(scene);
+  check.envelope.reset();
+  check.odom.x = 0.5;
+  EXPECT_NEAR(check.of(straightScene(0.0)).clearance_left, 2.5 - kHalfTruck, 0.01);
+}
+
 TEST(Envelope, AWallThatWasNotFoundIsNotRemembered) {
   Check check;
   for (double x = 0.0; x <= 3.0; x += 0.6) {
