@@ -122,6 +122,17 @@ TEST_F(CanBridgeTest, BeforeAnyCommandItTellsItsOwnReason) {
   rig.arbiter_alive = false;
   rig.run(0.1);
   EXPECT_EQ(rig.judge.last->reason, static_cast<std::uint8_t>(Reason::kStartUp));
+  EXPECT_TRUE(std::isinf(rig.bridge->status().command_age));
+}
+
+TEST_F(CanBridgeTest, ItsStatusTellsOfTheCabsWheelAndPedals) {
+  rig.cab.steering_wheel = 1.0;
+  rig.cab.throttle = 0.25;
+  rig.cab.brake = 0.5;
+  rig.run(0.5);
+  EXPECT_NEAR(rig.bridge->status().steering_wheel, 1.0, 0.001);
+  EXPECT_EQ(rig.bridge->status().throttle_pedal, 0.25);
+  EXPECT_EQ(rig.bridge->status().brake_pedal, 0.5);
 }
 
 TEST_F(CanBridgeTest, CountsTheChangesOfItsState) {
