@@ -336,6 +336,14 @@ TEST(Envelope, AWallOfTwoPointsBesideEachOtherCounts) {
   EXPECT_NEAR(check.of(scene).clearance_left, 1.6 - kHalfTruck, 1e-6);
 }
 
+TEST(Envelope, AGapOfThreeMetresInAWallIsBridged) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  scene.tunnel.centerline = geometry::Path();  // the stations stand at whole metres
+  scene.walls.left.curve = {{4.0, 1.6}, {7.0, 1.6}};
+  EXPECT_NEAR(check.of(scene).clearance_left, 1.6 - kHalfTruck, 1e-6);
+}
+
 TEST(Envelope, AWallWithoutAPointIsNone) {
   Check check;
   Scene scene = straightScene(0.0);
