@@ -69,6 +69,13 @@ TEST(Envelope, SightEndsTheFreeDistance) {
   EXPECT_NEAR(result.free_distance, 15.0 - check.truck.front_overhang, 0.01);
 }
 
+TEST(Envelope, SightEndsWithTheCenterlineThoughTheWallsGoOn) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  scene.tunnel.centerline = sceneAt(straight(), {20.0, 0.0, 0.0}, 5.0, Stamp(1), 10.0).tunnel.centerline;
+  EXPECT_NEAR(check.of(scene).free_distance, 10.0 - check.truck.front_overhang, 0.01);
+}
+
 TEST(Envelope, WithoutWallsAndCenterlineNothingIsFree) {
   Check check;
   Scene scene;
