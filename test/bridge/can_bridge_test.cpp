@@ -123,6 +123,9 @@ TEST_F(CanBridgeTest, BeforeAnyCommandItTellsItsOwnReason) {
   rig.run(0.1);
   EXPECT_EQ(rig.judge.last->reason, static_cast<std::uint8_t>(Reason::kStartUp));
   EXPECT_TRUE(std::isinf(rig.bridge->status().command_age));
+  rig.arbiter_alive = true;
+  rig.run(0.1);
+  EXPECT_LT(rig.bridge->status().command_age, 0.03);
 }
 
 TEST_F(CanBridgeTest, ItsStatusTellsOfTheCabsWheelAndPedals) {
