@@ -123,7 +123,8 @@ class OperatorSocket::Listener {
     const std::optional<unsigned> user = userOf(guest.peer);
     if (!user) return "refused: it is not known who asks";
     const std::string why = handler(*edge, *user);
-    return why.empty() ? "ok" : "refused: " + why;
+    if (why.empty()) return "ok";
+    return "refused: " + why;
   }
 
   // What does not fit into the socket's buffer is lost: nobody is waited for.

@@ -44,8 +44,8 @@ void makePrivateFolder(const std::string& folder) {
 std::string busFolder(const std::string& name) {
   const char* runtime = std::getenv("XDG_RUNTIME_DIR");
   const bool has_runtime = runtime != nullptr && runtime[0] == '/' && access(runtime, W_OK) == 0;
-  const std::string base = has_runtime ? std::string(runtime) + "/tunnel_pilot_can"
-                                       : "/tmp/tunnel_pilot_can." + std::to_string(geteuid());
+  std::string base = "/tmp/tunnel_pilot_can." + std::to_string(geteuid());
+  if (has_runtime) base = std::string(runtime) + "/tunnel_pilot_can";
   makePrivateFolder(base);
   return base + "/" + name;
 }

@@ -93,7 +93,8 @@ std::string J1939Bus::trouble() const {
     return address + " is lost to NAME " + hexadecimal(*winner) +
            ": give one of the two another address, then start anew";
   }
-  return claim_.overdue() ? address + " is not claimed: nobody hears the claim, or it is contended" : "";
+  if (!claim_.overdue()) return "";
+  return address + " is not claimed: nobody hears the claim, or it is contended";
 }
 
 std::vector<Identifier> j1939Identifiers(const J1939Parameters& parameters) {

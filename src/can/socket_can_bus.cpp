@@ -189,8 +189,8 @@ std::string SocketCanBus::trouble() const {
   }
   if (!usable()) return "the driver of " + interface_ + " does not echo what was sent: use another";
   if (!bus_off_ && !stuck_ && !discarding_) return "";
-  std::string what =
-      bus_off_ ? interface_ + " is bus-off" : "frames are stuck in the queue of " + interface_;
+  std::string what = "frames are stuck in the queue of " + interface_;
+  if (bus_off_) what = interface_ + " is bus-off";
   if (helper_failed_.empty()) return what;
   return what + ", can_link_cycle failed (" + helper_failed_ + "): " + set + " down; " + set + " up";
 }

@@ -105,6 +105,44 @@ TEST_F(CanBridgeTest, DrivesTheTruckToTheCommandedSpeedAndArticulation) {
   EXPECT_TRUE(rig.bridge->status().autonomy_enabled);
 }
 
+TEST_F(CanBridgeTest, AStopKeepsItsCommandsModeAndAsksForNoSpeed) {
+  rig.run(1.5);
+  EXPECT_EQ(rig.judge.last->mode, static_cast<std::uint8_t>(supervision::Mode::kStandby));
+  rig.drive();
+  rig.bridge->stop(rig.now);
+  rig.run(0.1);
+  ASSERT_EQ(rig.state(), SafetyState::kStopping);
+  ASSERT_TRUE(rig.judge.last->steering_enable);
+  EXPECT_EQ(rig.judge.last->mode, static_cast<std::uint8_t>(supervision::Mode::kAutonomous));
+  EXPECT_EQ(rig.judge.last->speed, 0.0);
+  EXPECT_NEAR(rig.judge.last->acceleration, Rig::bridgeParameters().stop_deceleration, 0.01);
+}
+
+TEST_F(CanBridgeTest, BeforeAnyCommandItTellsItsOwnReason) {
+  rig.arbiter_alive = false;
+  rig.run(0.1);
+  EXPECT_EQ(rig.judge.last->reason, static_cast<std::uint8_t>(Reason::kStartUp));
+  EXPECT_TRUE(std::isinf(rig.bridge->status().command_age));
+  rig.arbiter_alive = true;
+  rig.run(0.1);
+  EXPECT_LT(rig.bridge->status().command_age, 0.03);
+}
+
+TEST_F(CanBridgeTest, ItsStatusTellsOfTheCabsWheelAndPedals) {
+  rig.cab.steering_wheel = 1.0;
+  rig.cab.throttle = 0.25;
+  rig.cab.brake = 0.5;
+  rig.run(0.5);
+  EXPECT_NEAR(rig.bridge->status().steering_wheel, 1.0, 0.001);
+  EXPECT_EQ(rig.bridge->status().throttle_pedal, 0.25);
+  EXPECT_EQ(rig.bridge->status().brake_pedal, 0.5);
+}
+
+TEST_F(CanBridgeTest, CountsTheChangesOfItsState) {
+  rig.drive();
+  EXPECT_EQ(rig.bridge->status().transitions, 3u) << "to STANDBY, ARMED and ACTIVE";
+}
+
 TEST_F(CanBridgeTest, RepeatsTheLastCommandEveryTwentyMilliseconds) {
   rig.drive();
   const std::size_t before = rig.judge.times.size();
@@ -170,6 +208,15 @@ TEST(CanBridgeRate, NeverSendsMoreThanSixteenFramesInAQuarterSecond) {
   EXPECT_TRUE(rig.judge.complaints.empty()) << rig.judge.complaints.front();
 }
 
+TEST(CanBridgeClock, AfterAJumpTheLinkProvesItsHealthAnewThoughTheNextTickHasAllFrames) {
+  Rig rig(0.025);
+  rig.run(1.5);
+  ASSERT_EQ(rig.state(), SafetyState::kStandby);
+  rig.bridge->clockJumped(rig.now);
+  rig.run(0.9);
+  EXPECT_EQ(rig.state(), SafetyState::kInit);
+}
+
 // -------- commands
 
 class RefusedCommand : public CanBridgeTest,
@@ -221,6 +268,31 @@ INSTANTIATE_TEST_SUITE_P(
                     [](Command& c, Stamp now) { c.stamp = now + ms(51); },
                     [](Command& c, Stamp) { c.sequence = 0; }));
 
+TEST_F(CanBridgeTest, TakesCommandsAtTheLimits) {
+  rig.run(1.5);
+  const BridgeParameters parameters = Rig::bridgeParameters();
+  for (const double side : {-1.0, 1.0}) {
+    Command command = rig.command;
+    command.sequence = 1u << 20;
+    command.stamp = rig.now;
+    command.articulation_angle = side * Rig::truckParameters().geometry.max_articulation;
+    command.speed = side < 0.0 ? 0.0 : parameters.max_speed;
+    command.acceleration = side < 0.0 ? 0.0 : parameters.max_acceleration;
+    rig.bridge->setCommand(command, rig.now);
+    EXPECT_EQ(rig.bridge->status().command_rejection, "");
+  }
+}
+
+TEST_F(CanBridgeTest, TakesACommandThatComesTwiceWhileDriving) {
+  rig.drive();
+  Command command = rig.command;
+  command.sequence = 1u << 20;
+  command.stamp = rig.now;
+  rig.bridge->setCommand(command, rig.now);
+  rig.bridge->setCommand(command, rig.now);
+  EXPECT_EQ(rig.bridge->status().commands_rejected, 0u);
+}
+
 TEST_F(CanBridgeTest, TakesAnArbiterThatStartedAgainOnlyWhenNotDriving) {
   rig.drive();
   rig.bridge->stop(rig.now);
@@ -265,6 +337,14 @@ TEST_F(CanBridgeTest, OperatorsStopIsOnTheBusWithinTheCallInEveryState) {
     EXPECT_TRUE(can::decode<can::TruckCommandFrame>(*frame)->stop);
     EXPECT_TRUE(isStop(other.state()));
   }
+}
+
+TEST_F(CanBridgeTest, OperatorsReleaseIsOnTheBusWithinTheCall) {
+  rig.drive();
+  rig.judge.stopAsked(rig.now);
+  rig.bridge->release(rig.now);
+  rig.pump();
+  EXPECT_TRUE(rig.judge.last->stop);
 }
 
 TEST_F(CanBridgeTest, ArbitersStopIsOnTheBusWithinTheCall) {

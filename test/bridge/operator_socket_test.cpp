@@ -1,18 +1,49 @@
 #include "tunnel_pilot/bridge/operator_socket.h"
 
 #include <gtest/gtest.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <cstdarg>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <random>
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+namespace {
+
+bool peer_is_unknown = false;
+bool stays_blocking = false;
+
+int refused() {
+  errno = EACCES;
+  return -1;
+}
+
+}  // namespace
+
+// The library's calls of these come here first.
+extern "C" int getsockopt(int socket, int level, int name, void* value, socklen_t* size) noexcept {
+  if (peer_is_unknown && name == SO_PEERCRED) return refused();
+  return static_cast<int>(syscall(SYS_getsockopt, socket, level, name, value, size));
+}
+extern "C" int ioctl(int descriptor, unsigned long request, ...) noexcept {
+  if (stays_blocking && request == FIONBIO) return refused();
+  va_list arguments;
+  va_start(arguments, request);
+  void* const argument = va_arg(arguments, void*);
+  va_end(arguments);
+  return static_cast<int>(syscall(SYS_ioctl, descriptor, request, argument));
+}
 
 namespace tunnel_pilot::bridge {
 namespace {
@@ -48,7 +79,10 @@ class Client {
 class OperatorSocketTest : public ::testing::Test {
  protected:
   OperatorSocketTest() : folder_(makeFolder()), path_(folder_ + "/operator.sock") {}
-  ~OperatorSocketTest() override { std::filesystem::remove_all(folder_); }
+  ~OperatorSocketTest() override {
+    std::filesystem::remove_all(folder_);
+    peer_is_unknown = stays_blocking = false;
+  }
 
   static std::string makeFolder() {
     std::string name = (std::filesystem::temp_directory_path() / "operator_XXXXXX").string();
@@ -143,6 +177,37 @@ TEST_F(OperatorSocketTest, WhoIsSlowIsSentAwayAndHoldsUpNobodyElse) {
   EXPECT_EQ(edges_.size(), 1U);
 }
 
+TEST_F(OperatorSocketTest, AClockThatJumpsBackSendsAwayWhoWaits) {
+  OperatorSocket socket(path_);
+  const Client client(path_);
+  client.say("sto");
+  poll(socket, ms(5000));
+  poll(socket, ms(4999));
+  client.say("p\n");
+  poll(socket, ms(5000));
+  EXPECT_TRUE(edges_.empty());
+}
+
+TEST_F(OperatorSocketTest, OfWhomNobodyKnowsWhoItIsNothingIsTaken) {
+  OperatorSocket socket(path_);
+  peer_is_unknown = true;
+  const Client client(path_);
+  client.say("engage\n");
+  poll(socket);
+  EXPECT_EQ(client.answer(), "refused: it is not known who asks\n");
+  EXPECT_TRUE(edges_.empty());
+}
+
+TEST_F(OperatorSocketTest, WhoCouldHoldItUpIsSentAwayUnheard) {
+  OperatorSocket socket(path_);
+  const Client client(path_);
+  client.say("engage\n");
+  stays_blocking = true;
+  poll(socket);
+  EXPECT_TRUE(edges_.empty());
+  EXPECT_EQ(client.answer(), "");
+}
+
 TEST_F(OperatorSocketTest, ACrowdThatSaysNothingIsSentAway) {
   OperatorSocket socket(path_);
   std::vector<std::unique_ptr<Client>> crowd;
@@ -172,6 +237,16 @@ TEST_F(OperatorSocketTest, ItsFileGoesWithItAndADeadOneIsReplaced) {
   close(dead);  // its file stays
   OperatorSocket socket(path_);
   EXPECT_TRUE(Client(path_).connected());
+}
+
+TEST_F(OperatorSocketTest, AFileInItsPlaceThatIsNoSocketIsLeftAlone) {
+  std::ofstream(path_) << "somebody's";
+  EXPECT_THROW(OperatorSocket{path_}, std::runtime_error);
+  EXPECT_EQ(std::filesystem::file_size(path_), 10u);
+}
+
+TEST(OperatorSocketEdge, WhatIsNoEdgeHasNoName) {
+  EXPECT_EQ(toString(static_cast<OperatorSocket::Edge>(99)), "unknown edge");
 }
 
 TEST_F(OperatorSocketTest, WhereSomebodyListensOrNothingCanBeMadeItIsRefused) {

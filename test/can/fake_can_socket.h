@@ -107,9 +107,12 @@ class FakeKernel {
   int opened = 0;
   int writes = 0;  ///< calls of send()
 
-  std::string helper_fails;  ///< why; empty: it works
-  int helper_steps = 3;      ///< looks until it is done
-  int cycles = 0;            ///< starts of the helper
+  int open_error = 0;          ///< errno of the next open()
+  std::string helper_missing;  ///< why it cannot be started; empty: it can
+  std::string helper_fails;    ///< why; empty: it works
+  int helper_steps = 3;        ///< looks until it is done
+  bool silent_cycle = false;   ///< neither the socket nor netlink tells of what the helper did
+  int cycles = 0;              ///< starts of the helper
 
  private:
   Frame pop() {
@@ -125,6 +128,7 @@ class FakeCanSocket : public CanSocket {
 
   int open(const std::vector<Identifier>& listen) override {
     if (!kernel_.link.present) return ENODEV;
+    if (kernel_.open_error != 0) return kernel_.open_error;
     kernel_.listen = listen;
     kernel_.inbox.clear();
     kernel_.attached = true;
@@ -165,6 +169,7 @@ class FakeCanSocket : public CanSocket {
   }
 
   bool startCycle() override {
+    if (!kernel_.helper_missing.empty()) return tell_missing_ = true, false;
     ++kernel_.cycles;
     steps_ = kernel_.helper_steps;
     running_ = true;
@@ -172,12 +177,14 @@ class FakeCanSocket : public CanSocket {
   }
 
   LinkCycle cycle() override {
+    if (std::exchange(tell_missing_, false)) return {LinkCycle::Stage::kFailed, kernel_.helper_missing};
     if (!running_) return {};
     if (steps_-- > 0) return {LinkCycle::Stage::kRunning, ""};
     running_ = false;
     if (!kernel_.helper_fails.empty()) return {LinkCycle::Stage::kFailed, kernel_.helper_fails};
     kernel_.down();
     kernel_.up();
+    if (kernel_.silent_cycle) kernel_.inbox.clear(), kernel_.changes.clear();
     return {LinkCycle::Stage::kDone, ""};
   }
 
@@ -185,6 +192,7 @@ class FakeCanSocket : public CanSocket {
 
  private:
   FakeKernel& kernel_;
+  bool tell_missing_ = false;
   bool running_ = false;
   int steps_ = 0;
 };

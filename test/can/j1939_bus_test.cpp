@@ -540,6 +540,12 @@ TEST(Profile, OfTheShippedFilesAgree) {
   EXPECT_EQ(pilots.j1939.name, kName);
 }
 
+TEST(Profile, IsTheOneThatTheFileNames) {
+  YAML::Node yaml = YAML::LoadFile(configFile("can_bridge.yaml"));
+  yaml["profile"] = "j1939";
+  EXPECT_EQ(load(yaml, Side::kPilot).kind, ProfileKind::kJ1939);
+}
+
 TEST(Profile, ThatDoNotAgreeAreRefused) {
   const Profile pilots = load(YAML::LoadFile(configFile("can_bridge.yaml")), Side::kPilot);
   Profile trucks = load(YAML::LoadFile(configFile("truck_controller.yaml")), Side::kTruck);

@@ -142,6 +142,15 @@ TEST_F(SocketCanBusTest, WithoutTheHelperItStaysDownSaysSoAndAnOperatorCanCycle)
   EXPECT_EQ(bus().trouble(), "");
 }
 
+TEST_F(SocketCanBusTest, AHelperThatCannotBeStartedIsToldAtOnce) {
+  kernel.helper_missing = "it is not installed";
+  bus();
+  kernel.stall();
+  bus().send(makeFrame(kOwn));
+  bus().discard();
+  expectTrouble("can_link_cycle failed (it is not installed)");
+}
+
 TEST_F(SocketCanBusTest, BusOffStaysUntilTheLinkWasDown) {
   bus();
   kernel.busOff();
@@ -154,6 +163,17 @@ TEST_F(SocketCanBusTest, BusOffStaysUntilTheLinkWasDown) {
   bus().discard();
   for (int i = 0; i < 10; ++i) read();
   EXPECT_EQ(bus().state(), BusState::kActive);
+}
+
+TEST_F(SocketCanBusTest, SaysThatItIsBusOffAndWhyItStaysSo) {
+  kernel.helper_fails = "exit status 1";
+  bus();
+  kernel.busOff();
+  read();
+  EXPECT_EQ(bus().trouble(), "can0 is bus-off");
+  bus().discard();
+  for (int i = 0; i < 10; ++i) read();
+  expectTrouble("can0 is bus-off, can_link_cycle failed (exit status 1)");
 }
 
 TEST_F(SocketCanBusTest, FindsABusThatWasOffBeforeItStarted) {
@@ -228,6 +248,15 @@ TEST_F(SocketCanBusTest, ALinkThatWasDownForAMomentIsToldAllTheSame) {
   EXPECT_EQ(bus().state(), BusState::kActive);
 }
 
+TEST_F(SocketCanBusTest, OfAnInterruptionThatIsOverItSaysNothing) {
+  bus();
+  kernel.down();
+  kernel.up();
+  read();
+  ASSERT_EQ(bus().state(), BusState::kDown);
+  EXPECT_EQ(bus().trouble(), "");
+}
+
 TEST_F(SocketCanBusTest, AWriteToALinkThatWentDownIsFoundByItsError) {
   bus();
   kernel.link.up = false;
@@ -269,17 +298,26 @@ TEST_F(SocketCanBusTest, AVanishedInterfaceOfWhichNetlinkAloneTellsIsClosed) {
   expectTrouble("no interface can0");
 }
 
-TEST_F(SocketCanBusTest, ACycleOfWhichNetlinkToldNothingCounts) {
+TEST_F(SocketCanBusTest, ACycleOfWhichNothingWasToldCounts) {
+  kernel.silent_cycle = true;
   bus();
   kernel.stall();
   bus().send(makeFrame(kOwn));
   bus().discard();
-  for (int i = 0; i < 10; ++i) {
-    read();
-    kernel.changes.clear();
-  }
+  for (int i = 0; i < 10; ++i) read();
   EXPECT_EQ(bus().state(), BusState::kActive);
   EXPECT_EQ(bus().inFlight(), 0u);
+}
+
+TEST_F(SocketCanBusTest, AfterACycleOfWhichNothingWasToldTheLinkIsAskedHowItIs) {
+  kernel.silent_cycle = true;
+  bus();
+  kernel.link.state = BusState::kBusOff;
+  kernel.changes.push_back(kernel.link);
+  read();
+  bus().discard();
+  for (int i = 0; i < 10; ++i) read();
+  EXPECT_EQ(bus().state(), BusState::kActive);
 }
 
 TEST_F(SocketCanBusTest, AnEchoThatWasNotExpectedIsALateOne) {
@@ -310,6 +348,16 @@ TEST_F(SocketCanBusTest, MayStartBeforeItsInterface) {
   EXPECT_EQ(bus().state(), BusState::kActive);
 }
 
+TEST_F(SocketCanBusTest, AnInterfaceThatCannotBeOpenedSaysWhyAndIsTriedAnew) {
+  kernel.open_error = EPERM;
+  EXPECT_EQ(bus().state(), BusState::kDown);
+  expectTrouble("can0 cannot be opened: Operation not permitted");
+  kernel.open_error = 0;
+  kernel.changes.push_back(kernel.link);
+  read();
+  EXPECT_EQ(bus().state(), BusState::kActive);
+}
+
 TEST_F(SocketCanBusTest, DoesNotUseAControllerThatRestartsItself) {
   kernel.link.restart_ms = 100;
   EXPECT_EQ(bus().state(), BusState::kDown);
@@ -326,6 +374,23 @@ TEST_F(SocketCanBusTest, DoesNotUseADriverWhoseEchoProvesNothing) {
 TEST_F(SocketCanBusTest, AVirtualInterfaceNeedsNeither) {
   kernel.link.controller = kernel.link.echoes = kernel.link.configured = false;
   EXPECT_EQ(bus().state(), BusState::kActive);
+}
+
+TEST_F(SocketCanBusTest, AVirtualInterfaceThatIsDownIsNotAskedForABitRate) {
+  kernel.link.controller = kernel.link.echoes = kernel.link.configured = false;
+  bus();
+  kernel.down();
+  read();
+  EXPECT_EQ(bus().trouble(), "can0 is down: ip link set can0 up");
+}
+
+TEST_F(SocketCanBusTest, AVirtualInterfaceWithAFullQueueIsStuck) {
+  kernel.link.controller = kernel.link.echoes = kernel.link.configured = false;
+  bus();
+  kernel.stall();
+  while (bus().send(makeFrame(kOwn))) {
+  }
+  EXPECT_EQ(bus().trouble(), "frames are stuck in the queue of can0");
 }
 
 TEST(CanSocketTest, RefusesNamesThatNoInterfaceCanHave) {

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "arbiter_bench.h"
+#include "tunnel_pilot/vehicle/articulation.h"
 
 // What an ordinary drive never shows: inputs that come in an odd order or not at all, tables without
 // walls or with sources that do not steer.
@@ -101,6 +102,15 @@ TEST(ArbiterEdge, TwoDriversThatLackTheTunnelAreExcusedBoth) {
     bench.arbiter->setProposal(Source::kLidarDriver, unable, bench.now);
     EXPECT_FALSE(bench.cycle().command.stop) << i;
   }
+}
+
+TEST(ArbiterEdge, ADriverThatIsUnableInAValidTunnelIsNotExcused) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.proposal_valid = false;
+  const Decision& decision = bench.cycle();
+  EXPECT_TRUE(decision.command.stop);
+  EXPECT_EQ(decision.command.reason, Reason::kNoSource);
 }
 
 // ---- an order of inputs that is not the usual one
@@ -210,6 +220,79 @@ TEST(ArbiterEdge, ACenterlineTooOldForDeadReckoningHolds) {
   EXPECT_EQ(bench.cycles(10).command.source, Source::kHold);
 }
 
+TEST(ArbiterEdge, AfterAClockJumpMotionIsWaitedForAsAtTheStart) {
+  ArbiterBench bench;
+  bench.cycles(5);
+  bench.arbiter->clockJumped();
+  bench.give_motion = false;
+  EXPECT_EQ(bench.cycle().command.reason, Reason::kStartUp);
+}
+
+// Where the corridor's left edge ends of a truck in a bend, which turns by this share of what its hinge
+// says.
+double endOfCorridor(double share) {
+  ArbiterBench bench;
+  bench.wanted = bench.motion.articulation = 0.2;
+  bench.motion.yaw_rate = share * vehicle::yawRate(bench.truck.geometry, 3.0, 0.2, 0.0);
+  bench.drive();
+  return bench.cycles(100).corridor_left.back().y();
+}
+
+TEST(ArbiterEdge, ATruckSeenToTurnLessThanItsHingeIsExpectedToGoWider) {
+  EXPECT_LT(endOfCorridor(0.8), endOfCorridor(1.0) - 0.05);
+}
+
+TEST(ArbiterEdge, AHeldArticulationIsOfTheTimeOfTheLastMotionAndWithoutAnyOfNone) {
+  ArbiterBench bench;
+  EXPECT_EQ(bench.arbiter->decide(bench.now).command.stamp, Stamp{});
+  bench.give_proposal = bench.give_scan = false;
+  const Command& command = bench.cycle().command;
+  ASSERT_EQ(command.source, Source::kHold);
+  EXPECT_EQ(command.stamp, bench.now);
+  bench.arbiter->clockJumped();
+  EXPECT_EQ(bench.arbiter->decide(bench.now).command.stamp, Stamp{});
+}
+
+TEST(ArbiterEdge, BetweenScansTheWayDrivenShortensTheFreeOneDownToNothing) {
+  ArbiterBench bench;
+  bench.obstacle = 8.0;
+  bench.drive();
+  const double free = bench.cycle().free_distance;
+  bench.give_scan = false;
+  EXPECT_NEAR(bench.cycles(10).free_distance, free - 10 * 3.0 * 0.02, 1e-9);
+  EXPECT_EQ(bench.cycles(200).free_distance, 0.0);
+}
+
+TEST(ArbiterEdge, AScanFromBeforeTheMotionIsNotCompared) {
+  ArbiterBench bench;
+  bench.latency = milliseconds(500);
+  EXPECT_TRUE(std::isnan(bench.cycles(5).free_distance));
+}
+
+TEST(ArbiterEdge, AnObstacleWithinTheReserveStopsATruckThatStands) {
+  for (const double beyond : {-0.1, 0.1}) {
+    ArbiterBench bench;
+    bench.motion.speed = 0.0;
+    bench.obstacle = bench.truck.geometry.front_overhang + bench.parameters.envelope.reserve + beyond;
+    bench.drive();
+    EXPECT_EQ(bench.cycle().command.stop, beyond < 0.0) << beyond;
+  }
+}
+
+TEST(ArbiterEdge, DeadReckoningSteersFromWhereTheTruckIsOnceTheSteeringAnswers) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.tunnel_valid = bench.proposal_valid = false;
+  bench.motion.yaw_rate = 0.05;
+  const Decision& decision = bench.cycles(20);
+  ASSERT_EQ(decision.command.source, Source::kDeadReckoning);
+  const geometry::Pose ahead = drivers::advanced(
+      geometry::Pose(), 3.0, 0.05, bench.truck.steering.dead_time + bench.truck.steering.lag);
+  const drivers::PathFollowerGains& gains = bench.parameters.envelope.follower;
+  EXPECT_NEAR(decision.command.articulation_angle,
+              -gains.offset * ahead.y - gains.heading * ahead.heading, 1e-4);
+}
+
 // ---- what stops, and for how long
 
 TEST(ArbiterEdge, WhereTheTruckHasNoStatesStartingUpIsNoLatchedStop) {
@@ -230,6 +313,64 @@ TEST(ArbiterEdge, AtRestAResetIsRefusedWhileSomethingStops) {
   bench.give_proposal = false;
   EXPECT_TRUE(bench.cycles(20).command.stop);
   EXPECT_FALSE(bench.arbiter->reset(bench.now));
+}
+
+TEST(ArbiterEdge, WithoutWallChecksAScanThatStaysAwayStopsAllTheSame) {
+  ArbiterBench bench;
+  bench.parameters.wall_checks = false;
+  startAnew(bench);
+  bench.drive();
+  bench.give_scan = false;
+  bench.latency = Stamp::zero();  // a driver that needs none
+  const int cycles = static_cast<int>(bench.parameters.scan_stop_age / 0.02);
+  EXPECT_FALSE(bench.cycles(cycles - 5).command.stop);
+  const Decision& decision = bench.cycles(6);
+  EXPECT_TRUE(decision.command.stop);
+  EXPECT_EQ(decision.command.reason, Reason::kScanStale);
+}
+
+TEST(ArbiterEdge, AnObstacleIsToldAsOneAmongScansThatShowTooLittleRoom) {
+  ArbiterBench bench;
+  bench.parameters.wall_scans = 2;
+  startAnew(bench);
+  bench.drive();
+  bench.narrow = 3.0;
+  bench.cycle();
+  bench.narrow.reset();
+  bench.obstacle = 3.0;
+  const Decision& decision = bench.cycle();
+  EXPECT_TRUE(decision.command.stop);
+  EXPECT_EQ(decision.command.reason, Reason::kObstacle);
+}
+
+TEST(ArbiterEdge, ATruckThatWaitsForAFreeWayIsHeldByNoSource) {
+  ArbiterBench bench;
+  bench.motion.speed = 0.0;
+  bench.obstacle = bench.truck.geometry.front_overhang + bench.parameters.envelope.reserve + 0.1;
+  bench.drive();
+  bench.obstacle.reset();
+  const Decision& decision = bench.cycles(10);
+  EXPECT_EQ(decision.limited_by, SpeedLimit::kObstacle);
+  EXPECT_EQ(decision.speed_source, Source::kNone);
+}
+
+TEST(ArbiterEdge, APauseOfTheClockUpToItsLimitIsNoJump) {
+  ArbiterBench bench;
+  bench.drive();
+  const Stamp later = bench.now + fromSeconds(bench.parameters.clock_jump);
+  EXPECT_NE(bench.arbiter->decide(later).command.reason, Reason::kClockJump);
+}
+
+TEST(ArbiterEdge, AStopOutlastsTheTrucksResetByTheRecoveryTime) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.proposal_valid = false;
+  ASSERT_TRUE(bench.cycle().command.stop);
+  bench.proposal_valid = true;
+  bench.state = {false, false, Reason::kNotEngaged};
+  const int cycles = static_cast<int>(bench.parameters.recovery_time / 0.02);
+  EXPECT_TRUE(bench.cycles(cycles - 1).command.stop);
+  EXPECT_FALSE(bench.cycles(5).command.stop);
 }
 
 TEST(ArbiterEdge, AClockThatJumpsWhileNobodyIsEngagedLatchesNothing) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "drift_scene.h"
+#include "tunnel_pilot/vehicle/articulation.h"
 
 namespace tunnel_pilot::supervision {
 namespace {
@@ -68,6 +69,13 @@ TEST(Envelope, SightEndsTheFreeDistance) {
   EXPECT_NEAR(result.free_distance, 15.0 - check.truck.front_overhang, 0.01);
 }
 
+TEST(Envelope, SightEndsWithTheCenterlineThoughTheWallsGoOn) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  scene.tunnel.centerline = sceneAt(straight(), {20.0, 0.0, 0.0}, 5.0, Stamp(1), 10.0).tunnel.centerline;
+  EXPECT_NEAR(check.of(scene).free_distance, 10.0 - check.truck.front_overhang, 0.01);
+}
+
 TEST(Envelope, WithoutWallsAndCenterlineNothingIsFree) {
   Check check;
   Scene scene;
@@ -127,6 +135,19 @@ TEST(Envelope, AnObstacleBesideTheCorridorIsNone) {
   EXPECT_EQ(check.of(scene).free_until, Envelope::End::kSight);
 }
 
+TEST(Envelope, WhatStandsBehindTheTailIsNoObstacle) {
+  Check check;
+  // A tail of whole metres: the last station stands there, with edges that would go on behind it.
+  check.truck.rear_overhang = 7.0 - check.truck.front_axle_to_hinge - check.truck.rear_axle_to_hinge;
+  check.envelope = Envelope(check.parameters.envelope, check.parameters.limiter, check.truck);
+  Scene scene = straightScene(0.0);
+  addObstacle(scene, -6.5, 0.0, 0.8);
+  ASSERT_EQ(check.of(scene).free_until, Envelope::End::kObstacle) << "beside the tail it is one";
+  scene = straightScene(0.0);
+  addObstacle(scene, -7.5, 0.0, 0.8);
+  EXPECT_EQ(check.of(scene).free_until, Envelope::End::kSight);
+}
+
 TEST(Envelope, AnObstacleWithinTheMarginCounts) {
   Check check;
   Scene scene = straightScene(0.0);
@@ -143,6 +164,42 @@ TEST(Envelope, ARoughWallWithinTheMarginIsNoObstacle) {
   for (auto& p : scene.walls.left.curve) p.y() = kHalfTruck + margin + 0.03;
   for (const double x : {7.0, 7.15, 7.3}) scene.points.push_back({x, kHalfTruck + margin - 0.03});
   EXPECT_EQ(check.of(scene).free_until, Envelope::End::kWall);
+}
+
+TEST(Envelope, AnObstacleThatTouchesTheRoughWallIsOne) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  const double margin = check.parameters.envelope.margin;
+  for (auto& p : scene.walls.left.curve) p.y() = kHalfTruck + margin + 0.03;
+  for (const double y : {1.3, 1.45, 1.6}) scene.points.push_back({7.0, y});
+  EXPECT_EQ(check.of(scene).free_until, Envelope::End::kObstacle);
+}
+
+TEST(Envelope, AReturnThatStandsOffTheWallByItsRoughnessIsNotTheWalls) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  scene.tunnel.centerline = geometry::Path();  // the stations stand at whole metres
+  const double wall = kHalfTruck + check.parameters.envelope.margin + 0.03;
+  for (auto& p : scene.walls.left.curve) p.y() = wall;
+  scene.points = {{7.0, wall - 0.20}, {7.1, 1.65}, {7.2, 1.65}};
+  EXPECT_EQ(check.of(scene).free_until, Envelope::End::kObstacle);
+}
+
+TEST(Envelope, ReturnsThatStandApartByTheSmallestObstacleAreNotOne) {
+  Check check;
+  check.parameters.envelope.smallest_obstacle = 0.5;
+  check.envelope = Envelope(check.parameters.envelope, check.parameters.limiter, check.truck);
+  Scene scene = straightScene(0.0);
+  for (const double y : {-0.5, 0.0, 0.5}) scene.points.push_back({7.0, y});
+  EXPECT_EQ(check.of(scene).free_until, Envelope::End::kSight);
+}
+
+TEST(Envelope, DustBeforeAnObstacleDoesNotBringItNearer) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  scene.points.push_back({4.0, 0.0});
+  addObstacle(scene, 9.0, 0.0, 0.8);
+  EXPECT_NEAR(check.of(scene).free_distance, 9.0 - check.truck.front_overhang, 0.05);
 }
 
 // Where the way ends that a truck takes with a held articulation, left of where it points to [m].
@@ -202,9 +259,8 @@ TEST(Envelope, ACommandIntoTheWallIsSeenBeforeItHappens) {
   EXPECT_LT(away, check.of(straightScene(0.0)).clearance_left - 0.3);
 }
 
-TEST(Envelope, RemembersTheWallsBesideTheTruck) {
-  // The wall comes nearer beside the rear body, where the lidar at the nose no longer looks.
-  Check check;
+// The left wall comes nearer beside the rear body, where the lidar at the nose no longer looks.
+void passANarrowPlace(Check& check) {
   for (double x = 0.0; x <= 8.0; x += 0.25) {
     check.odom = {x, 0.0, 0.0};
     Scene scene = straightScene(0.0);
@@ -213,9 +269,42 @@ TEST(Envelope, RemembersTheWallsBesideTheTruck) {
     }
     check.of(scene);
   }
+}
+
+TEST(Envelope, RemembersTheWallsBesideTheTruck) {
+  Check check;
+  passANarrowPlace(check);
   EXPECT_NEAR(check.envelope.result().clearance_left, 2.5 - 0.5 - kHalfTruck, 0.05);
   check.envelope.reset();
   EXPECT_NEAR(check.of(straightScene(0.0)).clearance_left, 2.5 - kHalfTruck, 0.01);
+}
+
+TEST(Envelope, ATruckThatStandsForLongRemembersTheWallsBesideIt) {
+  Check check;
+  passANarrowPlace(check);
+  for (int scan = 0; scan < 1000; ++scan) check.of(straightScene(0.0));
+  EXPECT_NEAR(check.envelope.result().clearance_left, 2.5 - 0.5 - kHalfTruck, 0.05);
+}
+
+TEST(Envelope, AfterAResetNothingOfTheWallsIsRemembered) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  for (auto& p : scene.walls.left.curve) p.y() = 1.6;
+  check.of(scene);
+  check.envelope.reset();
+  check.odom.x = 0.5;
+  EXPECT_NEAR(check.of(straightScene(0.0)).clearance_left, 2.5 - kHalfTruck, 0.01);
+}
+
+TEST(Envelope, AWallThatWasNotFoundIsNotRemembered) {
+  Check check;
+  for (double x = 0.0; x <= 3.0; x += 0.6) {
+    check.odom = {x, 0.0, 0.0};
+    Scene scene = straightScene(0.0);
+    scene.walls.left.found = false;
+    check.of(scene);
+  }
+  EXPECT_TRUE(std::isnan(check.envelope.result().clearance_left));
 }
 
 TEST(Envelope, AGapInAWallIsNotBridged) {
@@ -246,6 +335,22 @@ TEST(Envelope, AWallThatStepsAsideCountsWithItsNearestPoint) {
   EXPECT_NEAR(check.of(scene).clearance_left, 1.6 - kHalfTruck, 1e-6);
 }
 
+TEST(Envelope, AWallOfTwoPointsBesideEachOtherCounts) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  scene.tunnel.centerline = geometry::Path();  // the stations stand at whole metres
+  scene.walls.left.curve = {{5.0, 1.6}, {5.0, 2.5}};
+  EXPECT_NEAR(check.of(scene).clearance_left, 1.6 - kHalfTruck, 1e-6);
+}
+
+TEST(Envelope, AGapOfThreeMetresInAWallIsBridged) {
+  Check check;
+  Scene scene = straightScene(0.0);
+  scene.tunnel.centerline = geometry::Path();  // the stations stand at whole metres
+  scene.walls.left.curve = {{4.0, 1.6}, {7.0, 1.6}};
+  EXPECT_NEAR(check.of(scene).clearance_left, 1.6 - kHalfTruck, 1e-6);
+}
+
 TEST(Envelope, AWallWithoutAPointIsNone) {
   Check check;
   Scene scene = straightScene(0.0);
@@ -267,10 +372,116 @@ TEST(Envelope, TheCorridorIsDrawnFromTailToFront) {
   EXPECT_NEAR(result.corridor_right.back().y(), -kHalfTruck, 0.02);
 }
 
+TEST(Envelope, TheCorridorIsCutAcrossEachOfTheBodies) {
+  Check check;
+  check.articulation = check.commanded = 0.5;
+  const Envelope::Result& result = check.of(Scene());
+  EXPECT_NEAR((result.corridor_left.front() - result.corridor_right.front()).norm(), 2.0 * kHalfTruck,
+              0.1);
+}
+
 TEST(Envelope, StoppingDistanceIsReactionAndBraking) {
   Check check;
-  const auto& p = check.parameters.envelope;
-  EXPECT_DOUBLE_EQ(check.envelope.stoppingDistance(4.0), 4.0 * p.reaction_time + 8.0 / p.deceleration);
+  EnvelopeParameters p = check.parameters.envelope;
+  p.deceleration = 0.8;
+  const Envelope envelope(p, check.parameters.limiter, check.truck);
+  EXPECT_DOUBLE_EQ(envelope.stoppingDistance(4.0), 4.0 * p.reaction_time + 10.0);
+}
+
+// The corridor of a truck that turns its hinge, as far as its front axle is driven 6 m ahead.
+Envelope::Result turning(double speed, double rate, double reaction_time) {
+  Check check;
+  check.speed = speed;
+  check.commanded = 0.6;
+  check.parameters.envelope.horizon = 6.0;
+  check.parameters.envelope.reaction_time = reaction_time;
+  check.parameters.limiter.max_articulation_rate = rate;
+  check.envelope = Envelope(check.parameters.envelope, check.parameters.limiter, check.truck);
+  return check.of(Scene());
+}
+
+void expectSameCorridor(const Envelope::Result& a, const Envelope::Result& b) {
+  ASSERT_EQ(a.corridor_left.size(), b.corridor_left.size());
+  for (std::size_t i = 0; i < a.corridor_left.size(); ++i) {
+    EXPECT_LT((a.corridor_left[i] - b.corridor_left[i]).norm(), 1e-9) << i;
+    EXPECT_LT((a.corridor_right[i] - b.corridor_right[i]).norm(), 1e-9) << i;
+  }
+}
+
+TEST(Envelope, ATruckThatStandsTurnsItsHingeAsAtHalfAMetrePerSecond) {
+  // At 1 m/s without braking, twice the rate is the same turn on the same way.
+  expectSameCorridor(turning(0.0, 0.2, 1.0), turning(1.0, 0.4, 10.0));
+}
+
+// A standing truck with this hinge, driven 6 m ahead: where its corridor ends.
+struct EndOfWay {
+  explicit EndOfWay(Check& check) {
+    check.speed = 0.0;
+    check.parameters.envelope.horizon = 6.0;
+    check.envelope = Envelope(check.parameters.envelope, check.parameters.limiter, check.truck);
+    const Envelope::Result& result = check.of(Scene());
+    left = result.corridor_left.back();
+    right = result.corridor_right.back();
+    heading = std::atan2(right.x() - left.x(), left.y() - right.y());
+  }
+  geometry::Point left, right;
+  double heading;
+};
+
+TEST(Envelope, AHingeThatTurnsTheTruckTooLittleMakesItCrabByHalfOfWhatIsMissing) {
+  Check check;
+  check.articulation = check.commanded = 0.6;
+  check.response.gain = 0.5;
+  check.response.disturbance = -vehicle::yawRate(check.truck, 0.5, 0.6, 0.0);  // it does not turn at all
+  const double slip = -0.5 * std::tan(0.3);
+  const EndOfWay end(check);
+  EXPECT_NEAR(end.heading, 0.0, 1e-9);
+  EXPECT_NEAR(end.right.x(), 6.0 * std::cos(slip) + 1.0, 1e-9) << "the last whole metre before the nose";
+  const double way_there = 6.0 - (check.truck.front_overhang - 1.0) / std::cos(slip);
+  EXPECT_NEAR(end.right.y(), way_there * std::sin(slip) - kHalfTruck, 1e-9);
+}
+
+TEST(Envelope, TheWayTurnsByTheHingeInTheMiddleOfEachMetre) {
+  Check check;
+  check.commanded = 0.3;
+  check.parameters.limiter.max_articulation_rate = 0.2;  // 0.4 rad/m
+  const double turn = vehicle::yawRate(check.truck, 1.0, 0.15, 0.3);
+  EXPECT_NEAR(EndOfWay(check).heading, turn + 5.0 * vehicle::yawRate(check.truck, 1.0, 0.3, 0.0), 1e-9);
+}
+
+TEST(EnvelopeParameters, EachNumberIsRefusedBeyondItsRangeByItsName) {
+  const YAML::Node file = YAML::LoadFile(kConfig + "arbiter.yaml")["envelope"];
+  const auto refusal = [&](const std::string& key, double value) -> std::string {
+    YAML::Node yaml = YAML::Clone(file);
+    YAML::Node map = key == "offset" || key == "heading" ? yaml["follower"] : yaml;
+    if (key == "obstacle_points") {
+      map[key] = static_cast<int>(value);
+    } else {
+      map[key] = value;
+    }
+    try {
+      loadEnvelope(config::Node(yaml, "arbiter.yaml"));
+    } catch (const config::ConfigError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  struct Range {
+    std::string key;
+    double lowest, highest, beyond;
+  };
+  for (const Range& range :
+       {Range{"margin", 0.0, 2.0, 1e-4}, Range{"smallest_obstacle", 0.05, 2.0, 1e-4},
+        Range{"obstacle_points", 1.0, 50.0, 1.0}, Range{"deceleration", 0.1, 5.0, 1e-4},
+        Range{"reaction_time", 0.0, 3.0, 1e-4}, Range{"reserve", 0.0, 10.0, 1e-4},
+        Range{"horizon", 6.0, 60.0, 1e-4}, Range{"offset", 0.01, 2.0, 1e-4},
+        Range{"heading", 0.1, 10.0, 1e-4}}) {
+    EXPECT_EQ(refusal(range.key, range.lowest), "");
+    EXPECT_EQ(refusal(range.key, range.highest), "");
+    for (const double value : {range.lowest - range.beyond, range.highest + range.beyond}) {
+      EXPECT_NE(refusal(range.key, value).find(range.key), std::string::npos) << value;
+    }
+  }
 }
 
 }  // namespace
