@@ -498,6 +498,16 @@ TEST_F(J1939OnSocketCan, TheContentionBeginsWhenTheClaimIsProvenToBeSent) {
   EXPECT_EQ(kernel.sent.size(), 1u);
 }
 
+TEST_F(J1939OnSocketCan, AClaimThatFindsNoRoomInTheQueueIsToldAfterASecond) {
+  kernel.stall();
+  kernel.queue.resize(FakeKernel::kQueueLength);  // of another program's frames
+  run(ms(990));
+  EXPECT_EQ(bus.trouble(), "");
+  run(ms(30));
+  EXPECT_NE(bus.trouble().find("not claimed"), std::string::npos) << bus.trouble();
+  EXPECT_TRUE(kernel.sent.empty());
+}
+
 TEST_F(J1939OnSocketCan, TellsTheTroubleBelowFirst) {
   kernel.down();
   run(ms(100));
