@@ -106,6 +106,8 @@ const Tunnel& CenterlineEstimator::update(const Walls& walls, const std::optiona
     disbelieve();
     return refuse(TunnelReason::kPoorFit);
   }
+  // What is remembered there may have come from afar, where no width is checked.
+  if (!isTunnels(nodes_[nodeBeside()].width)) return refuse(TunnelReason::kWidthImplausible);
   fillState(walls);
   return tunnel_;
 }
@@ -192,13 +194,15 @@ TunnelReason CenterlineEstimator::checkSingle(const Walls& walls, bool has_odome
   return too_long ? TunnelReason::kSingleTooLong : TunnelReason::kNone;
 }
 
+bool CenterlineEstimator::isTunnels(double width) const {
+  return width >= parameters_.width_min && width <= parameters_.width_max;
+}
+
 // The width beside the truck must be a tunnel's, and what was expected of it: what earlier scans saw
 // there, or, without odometry, the last one.
 TunnelReason CenterlineEstimator::checkWidth(const std::optional<Pose>& pose) {
   const double width = measured_.front().width;
-  if (!(width >= parameters_.width_min && width <= parameters_.width_max)) {
-    return TunnelReason::kWidthImplausible;
-  }
+  if (!isTunnels(width)) return TunnelReason::kWidthImplausible;
   double jump = std::abs(width - last_width_.value_or(width));
   if (pose && !memory_.empty()) {
     const Point place = pose->transform(measured_.front().position);
@@ -393,11 +397,17 @@ void CenterlineEstimator::fillState(const Walls& walls) {
   state.lateral_offset = foot.lateral_offset;
   state.heading_error = geometry::wrapAngle(-foot.heading);
   state.curvature = foot.curvature;
+  const std::size_t beside = nodeBeside();
+  state.width = nodes_[beside].width;
+  fillCovariance(walls, beside);
+}
+
+// The node that is nearest to the reference point.
+std::size_t CenterlineEstimator::nodeBeside() const {
   const auto nearest = std::min_element(nodes_.begin(), nodes_.end(), [](const Node& a, const Node& b) {
     return a.position.squaredNorm() < b.position.squaredNorm();
   });
-  state.width = nearest->width;
-  fillCovariance(walls, static_cast<std::size_t>(std::distance(nodes_.begin(), nearest)));
+  return static_cast<std::size_t>(std::distance(nodes_.begin(), nearest));
 }
 
 // Of the fit about node `at`, the nearest to the reference point, taken at that point's foot.

@@ -99,7 +99,6 @@ TEST_F(CanMachine, DrivesWithEveryFrameConfirmed) {
 
 TEST_F(CanMachine, TakesNothingFromTheHeapOnceItDrives) {
   ASSERT_TRUE(pilot->drive()) << toString(pilot->state()) << " " << pilot->bus->trouble();
-  EXPECT_GT(pilot->allocations, 0) << "the bus tells its trouble at the start, so the counter counts";
   pilot->allocations = 0;
   pilot->run(times(3, 60));
   EXPECT_EQ(pilot->state(), SafetyState::kActive);

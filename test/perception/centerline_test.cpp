@@ -125,6 +125,23 @@ TEST(Centerline, WidthsThatAreNoTunnelsAreRefused) {
   }
 }
 
+// The walls stand back for half a metre: too wide for a tunnel, though not where the measuring begins.
+TEST(Centerline, ARememberedWidthBesideTheTruckThatIsNoTunnelsIsRefused) {
+  CenterlineEstimator estimator(parameters());
+  TunnelState state;
+  for (Pose base{}; base.x < 4.75; base.x += 0.25) {
+    Walls walls = straightWalls(base, fromSeconds(1.0 + 0.1 * base.x), 8.9);
+    for (auto* curve : {&walls.left.curve, &walls.right.curve}) {
+      for (Point& p : *curve) {
+        if (std::abs(base.x + p.x() - 4.75) < 0.3) p.y() += std::copysign(0.35, p.y());
+      }
+    }
+    state = estimator.update(walls, base).state;
+    EXPECT_TRUE(!state.valid || state.width <= parameters().width_max) << state.width;
+  }
+  EXPECT_EQ(state.reason, TunnelReason::kWidthImplausible) << state.width;
+}
+
 TEST(Centerline, AWidthThatWasNotSeenComingIsAFaultUntilItLasts) {
   CenterlineEstimator estimator(parameters());
   estimator.update(straightWalls({}, fromSeconds(1.0)), Pose{});

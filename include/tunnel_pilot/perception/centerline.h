@@ -102,6 +102,8 @@ class CenterlineEstimator {
   void fitPath();
   bool isPlausible();
   void prolongBackwards();
+  bool isTunnels(double width) const;
+  std::size_t nodeBeside() const;
   void fillState(const Walls& walls);
   void fillCovariance(const Walls& walls, std::size_t at);
 
