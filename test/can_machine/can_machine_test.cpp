@@ -99,6 +99,7 @@ TEST_F(CanMachine, DrivesWithEveryFrameConfirmed) {
 
 TEST_F(CanMachine, TakesNothingFromTheHeapOnceItDrives) {
   ASSERT_TRUE(pilot->drive()) << toString(pilot->state()) << " " << pilot->bus->trouble();
+  ASSERT_TRUE(allocationsAreCounted());
   pilot->allocations = 0;
   pilot->run(times(3, 60));
   EXPECT_EQ(pilot->state(), SafetyState::kActive);

@@ -127,6 +127,7 @@ TEST_F(CanMachineJ1939, ClaimsBeforeAllElseAndDrives) {
   const Stamp begin = steadyTime();
   start();
   ASSERT_TRUE(pilot->drive()) << tale();
+  ASSERT_TRUE(allocationsAreCounted());
   pilot->allocations = 0;
   pilot->run(times(2, 30));
   EXPECT_EQ(pilot->state(), SafetyState::kActive);

@@ -45,6 +45,8 @@ void writeTo(const std::string& path, const std::string& text) {
 
 }  // namespace
 
+bool allocationsAreCounted() { return allocationsOfOne() == 1; }
+
 Stamp steadyTime() { return Stamp(std::chrono::steady_clock::now().time_since_epoch()); }
 
 can::Profile profileOf(can::Side side, can::ProfileKind kind) {

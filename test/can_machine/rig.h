@@ -15,6 +15,7 @@
 namespace tunnel_pilot::bridge {
 
 Stamp steadyTime();
+bool allocationsAreCounted();  ///< or Pilot::allocations tells nothing
 
 // -------- what is asked for at a fault
 
@@ -88,7 +89,7 @@ class Pilot {
   can::SocketCanBus* bus = nullptr;   ///< beneath `network`, or the same
   std::unique_ptr<can::Bus> network;  ///< as the bridge has it
   std::unique_ptr<CanBridge> bridge;
-  Stamp stopped_at{};  ///< the tick that stopped
+  Stamp stopped_at{};    ///< the tick that stopped
   long allocations = 0;  ///< of bridge and bus, in commands and ticks
   bool engaged_by_us = false;
   bool armed_by_itself = false;
