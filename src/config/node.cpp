@@ -1,10 +1,13 @@
 #include "tunnel_pilot/config/node.h"
 
+#include <yaml-cpp/eventhandler.h>
+
 #include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <sstream>
 #include <utility>
 
@@ -39,6 +42,33 @@ std::string flowText(const YAML::Node& value) {
   YAML::Emitter out;
   out << YAML::Flow << value;
   return out.c_str();
+}
+
+// Takes a document's events and keeps nothing.
+class NoEvents : public YAML::EventHandler {
+  using Mark = const YAML::Mark&;
+  using Text = const std::string&;
+  using Anchor = YAML::anchor_t;
+  using Style = YAML::EmitterStyle::value;
+  void OnDocumentStart(Mark /*mark*/) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(Mark /*mark*/, Anchor /*anchor*/) override {}
+  void OnAlias(Mark /*mark*/, Anchor /*anchor*/) override {}
+  void OnScalar(Mark /*mark*/, Text /*tag*/, Anchor /*anchor*/, Text /*value*/) override {}
+  void OnSequenceStart(Mark /*mark*/, Text /*tag*/, Anchor /*anchor*/, Style /*style*/) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(Mark /*mark*/, Text /*tag*/, Anchor /*anchor*/, Style /*style*/) override {}
+  void OnMapEnd() override {}
+};
+
+// Asks for no more than two: behind the end of a document, what begins none (a comma) is to yaml-cpp 0.7
+// an empty document, and another, without end, which YAML::LoadAll would collect until no memory is
+// left.
+bool hasTwoDocuments(const std::string& text) {
+  std::istringstream stream(text);
+  YAML::Parser parser(stream);
+  NoEvents none;
+  return parser.HandleNextDocument(none) && parser.HandleNextDocument(none);
 }
 
 }  // namespace
@@ -193,6 +223,15 @@ void Node::finish() const {
   }
 }
 
+Node parseText(const std::string& text, const std::string& source) {
+  try {
+    if (hasTwoDocuments(text)) throw ConfigError(source + ": must be one YAML document");
+    return Node(YAML::Load(text), source);
+  } catch (const YAML::Exception& e) {
+    throw ConfigError(oneLine(source + ": is not YAML: " + e.what()));
+  }
+}
+
 Node loadFile(const std::string& file) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error)) throw ConfigError(file + ": is not a file");
@@ -201,11 +240,7 @@ Node loadFile(const std::string& file) {
   }
   std::ifstream stream(file);
   if (!stream) throw ConfigError(file + ": cannot be opened");
-  try {
-    return Node(YAML::Load(stream), file);
-  } catch (const YAML::Exception& e) {
-    throw ConfigError(file + ": is not YAML: " + e.what());
-  }
+  return parseText({std::istreambuf_iterator<char>(stream), {}}, file);
 }
 
 }  // namespace tunnel_pilot::config

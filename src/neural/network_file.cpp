@@ -238,9 +238,7 @@ void checkGolden(const Network& network, const std::vector<float>& input,
 
 Node readHeader(const std::string& text, const std::string& source) {
   if (text.size() > kMaxHeaderBytes) refuse(source, "has more than 1 MiB beside its numbers");
-  const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-  if (documents.size() != 1) refuse(source, "must be one YAML document");
-  return Node(documents.front(), source);
+  return config::parseText(text, source);
 }
 
 NetworkFile parse(std::string text, const std::string& source) {
@@ -282,13 +280,9 @@ double InputGroup::scaled(double value) const {
 NetworkFile parseNetwork(const std::string& content, const std::string& source) {
   if (content.size() > kMaxFileBytes) refuse(source, "is larger than 64 MiB");
   const std::string hash = checkedHash(content, source);
-  try {
-    NetworkFile file = parse(content.substr(0, content.size() - kHashLine), source);
-    file.sha256 = hash;
-    return file;
-  } catch (const YAML::Exception& e) {
-    refuse(source, std::string("is not YAML: ") + e.what());
-  }
+  NetworkFile file = parse(content.substr(0, content.size() - kHashLine), source);
+  file.sha256 = hash;
+  return file;
 }
 
 NetworkFile loadNetwork(const std::string& file) { return parseNetwork(readWhole(file), file); }

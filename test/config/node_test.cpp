@@ -56,6 +56,20 @@ TEST(ConfigNode, AKeyThatStandsTwiceIsNamed) {
   EXPECT_EQ(messageOf([&] { node.child("steering"); }), "truck.yaml: 'steering.lag' stands twice");
 }
 
+TEST(ConfigNode, ASecondDocumentIsRefusedAlsoWhereItHasNoEnd) {
+  // yaml-cpp makes empty documents of what begins none, one after the other.
+  for (const char* text :
+       {"a: 1\n---\nb: 2\n", "---\na: 1\n---\n", "a: 1\n...\n,\n", "a: 1\n...\nb: 1\n"}) {
+    EXPECT_EQ(messageOf([&] { parseText(text, "truck.yaml"); }),
+              "truck.yaml: must be one YAML document");
+  }
+}
+
+TEST(ConfigNode, OneDocumentMayHaveItsMarks) {
+  Node node = parseText("---\na: 1\n...\n", "truck.yaml");
+  EXPECT_EQ(node.integer("a", "1", 0, 5), 1);
+}
+
 TEST(ConfigNode, AMessageIsOneLineWhateverTheFileHolds) {
   Node node = parse("{a: \"x\\n\\e[31my\", \"b\\nc\": 1}");
   EXPECT_EQ(messageOf([&] { node.choice("a", {"z"}); }),

@@ -271,6 +271,7 @@ const BadFile kBadFiles[] = {
     {"width: 5", "width: 5, offset: 0", "file: 'output.offset' is unknown"},
     {"output: {", "output: [{", "file: is not YAML: "},
     {"version: 1\n", "version: 1\n---\n", "file: must be one YAML document"},
+    {"version: 1\n", "version: 1\n...\n,\n", "file: must be one YAML document"},
     {"training: |2-\n", "training: [|2-]\n", "file: is not YAML: "},
     {"parameters: |\n", "parameters: >\n", "file: 'parameters' is missing, or is no block of numbers"},
     {"parameters: |\n", "parameters: |\n  0.5\n", "file: parameters: more than the 81 that belong here"},

@@ -82,6 +82,10 @@ class Node {
   std::shared_ptr<std::vector<ParameterRecord>> records_;
 };
 
+/// Reads a text that holds one YAML document, and in it one map; `source` is what messages call it.
+/// Throws ConfigError.
+Node parseText(const std::string& text, const std::string& source);
+
 /// Reads a YAML file of at most 4 MiB as one map. Throws ConfigError when it cannot be opened or parsed.
 Node loadFile(const std::string& file);
 
