@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <sstream>
+#include <utility>
+#include <vector>
 
 namespace tunnel_pilot::world {
 namespace {
@@ -12,7 +15,7 @@ using geometry::PathPoint;
 using geometry::Point;
 
 constexpr double kFoldLimit = 0.9;  // curvature times wall offset; at 1 the inner wall would be a point
-constexpr double kMaxWallPoints = 20000.0;  // of one wall: each is compared with each
+constexpr double kMaxWallPoints = 20000.0;  // of one wall
 constexpr double kCornerSmoothing = 1.0;    // roughness fades out towards an opening's corners [m]
 
 Point normalOf(const PathPoint& p) { return {-std::sin(p.heading), std::cos(p.heading)}; }
@@ -27,6 +30,36 @@ struct TaggedChain {
     points.push_back(point);
     s.push_back(at);
   }
+};
+
+// Points by squares of a net: what is nearer to a point than a square's side lies in its square or in
+// one of the eight around it.
+class Net {
+ public:
+  explicit Net(double side) : side_(side) {}
+
+  void add(const Point& point, std::size_t index) { squares_[squareOf(point)].push_back(index); }
+
+  template <class Visit>
+  void visitNear(const Point& point, Visit visit) const {
+    const Square middle = squareOf(point);
+    for (const double dx : {-1.0, 0.0, 1.0}) {
+      for (const double dy : {-1.0, 0.0, 1.0}) {
+        const auto found = squares_.find({middle.first + dx, middle.second + dy});
+        if (found == squares_.end()) continue;
+        std::for_each(found->second.begin(), found->second.end(), visit);
+      }
+    }
+  }
+
+ private:
+  using Square = std::pair<double, double>;  // whole numbers
+  Square squareOf(const Point& point) const {
+    return {std::floor(point.x() / side_), std::floor(point.y() / side_)};
+  }
+
+  double side_;
+  std::map<Square, std::vector<std::size_t>> squares_;
 };
 
 class WallBuilder {
@@ -133,17 +166,21 @@ class WallBuilder {
     for (const double s : s_) widest = std::max(widest, halfWidth(s));
     const double neighbourhood = M_PI * (widest + plan_.separation);
     const double apart = std::max(plan_.separation, plan_.wall_spacing);  // crossing walls are within it
+    Net before(apart);
     for (std::size_t i = 0; i < all.points.size(); ++i) {
-      for (std::size_t k = 0; k < i; ++k) {
-        if ((all.points[i] - all.points[k]).squaredNorm() >= apart * apart) continue;
+      std::size_t first = i;
+      before.visitNear(all.points[i], [&](std::size_t k) {
+        if ((all.points[i] - all.points[k]).squaredNorm() >= apart * apart) return;
         double gap = std::abs(all.s[i] - all.s[k]);
         if (plan_.closed) gap = std::min(gap, line_.length() - gap);
-        if (gap <= neighbourhood) continue;
-        std::ostringstream out;
-        out << "brings the walls at s = " << all.s[k] << " m and s = " << all.s[i] << " m within "
-            << apart << " m of each other";
-        return out.str();
-      }
+        if (gap > neighbourhood) first = std::min(first, k);
+      });
+      before.add(all.points[i], i);
+      if (first == i) continue;
+      std::ostringstream out;
+      out << "brings the walls at s = " << all.s[first] << " m and s = " << all.s[i] << " m within "
+          << apart << " m of each other";
+      return out.str();
     }
     return "";
   }
