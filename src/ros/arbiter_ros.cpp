@@ -3,6 +3,7 @@
 #include <ros/console.h>
 #include <tunnel_pilot/ScanRejection.h>
 
+#include <algorithm>
 #include <boost/make_shared.hpp>
 #include <utility>
 
@@ -13,6 +14,7 @@ namespace tunnel_pilot::shell {
 namespace {
 
 constexpr double kDecisionPeriod = 0.02;  // [s]
+constexpr std::uint32_t kPending = 10;      // messages of a topic that wait for a decision
 
 supervision::Arbiter makeArbiter(const ros::NodeHandle& private_nh) {
   Parameters parameters(private_nh);
@@ -48,48 +50,57 @@ ArbiterRos::ArbiterRos(ros::NodeHandle nh, ros::NodeHandle private_nh)
 
 template <class Message, class Callback>
 void ArbiterRos::listen(ros::NodeHandle& nh, const std::string& topic, Callback callback) {
-  const boost::function<void(const boost::shared_ptr<const Message>&)> call =
-      [this, topic, callback](const boost::shared_ptr<const Message>& message) {
+  const boost::function<void(const ros::MessageEvent<const Message>&)> call =
+      [this, topic, callback](const ros::MessageEvent<const Message>& event) {
+        const Message& message = *event.getConstMessage();
         unheard_.erase(topic);
-        nowAfter(message->header.stamp);
+        const Stamp latest = nowAfter(message.header.stamp);
         checkClock();
-        callback(*message);
+        // In simulated time the clock may tell of the message's time later than the message comes.
+        const bool simulated = ros::Time::isSimTime();
+        callback(message, simulated ? latest : std::min(toCore(event.getReceiptTime()), latest));
       };
-  subscribers_.push_back(
-      nh.subscribe<Message>(topic, 2, call, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
+  subscribers_.push_back(nh.subscribe<Message>(topic, kPending, call, ros::VoidConstPtr(),
+                                               ros::TransportHints().tcpNoDelay()));
 }
 
-void ArbiterRos::subscribe(ros::NodeHandle& nh) {
+void ArbiterRos::subscribe(ros::NodeHandle nh) {
   using supervision::Source;
   unheard_ = {"points", "walls", "tunnel_state", "centerline", "odom", "joint_states"};
   if (arbiter_.parameters().needs_truck_state) unheard_.insert("truck_status");
   for (const auto& [topic, source] : {std::pair("lidar_driver/proposal", Source::kLidarDriver),
                                       std::pair("preview_driver/proposal", Source::kPreviewDriver),
                                       std::pair("teleoperation/proposal", Source::kTeleoperation)}) {
-    listen<Proposal>(nh, topic, [this, from = source](auto& m) { onProposal(from, m); });
+    listen<Proposal>(nh, topic, [this, from = source](auto& m, Stamp at) {
+      arbiter_.setProposal(from, toCore(m), at);
+      decide();
+    });
   }
-  listen<Walls>(nh, "walls", [this](auto& m) { arbiter_.setWalls(toCore(m), now()); });
-  listen<sensor_msgs::PointCloud2>(nh, "points", [this](auto& m) { onPoints(m); });
-  listen<ScanRejection>(nh, "scan_rejected", [this](auto& m) {
-    arbiter_.setRejection({static_cast<bool>(m.frozen)}, now());
-  });
-  listen<TunnelState>(nh, "tunnel_state", [this](auto& m) {
+  listen<TunnelState>(nh, "tunnel_state", [this](auto& m, Stamp at) {
+    inputs_.callAvailable();
     tunnel_.setState(toCore(m));
-    updateTunnel();
+    updateTunnel(at);
   });
-  listen<nav_msgs::Path>(nh, "centerline", [this](auto& m) {
+  nh.setCallbackQueue(&inputs_);
+  listen<Walls>(nh, "walls", [this](auto& m, Stamp at) { arbiter_.setWalls(toCore(m), at); });
+  listen<sensor_msgs::PointCloud2>(nh, "points", [this](auto& m, Stamp at) { setPoints(m, at); });
+  listen<ScanRejection>(nh, "scan_rejected", [this](auto& m, Stamp at) {
+    arbiter_.setRejection({static_cast<bool>(m.frozen)}, at);
+  });
+  listen<nav_msgs::Path>(nh, "centerline", [this](auto& m, Stamp at) {
     tunnel_.setCenterline(toCore(m.header.stamp), toCore(m));
-    updateTunnel();
+    updateTunnel(at);
   });
-  listen<nav_msgs::Odometry>(nh, "odom", [this](auto& m) {
+  listen<nav_msgs::Odometry>(nh, "odom", [this](auto& m, Stamp at) {
     motion_.setOdometry(m);
-    updateMotion();
+    updateMotion(at);
   });
-  listen<sensor_msgs::JointState>(nh, "joint_states", [this](auto& m) {
+  listen<sensor_msgs::JointState>(nh, "joint_states", [this](auto& m, Stamp at) {
     motion_.setJointState(m);
-    updateMotion();
+    updateMotion(at);
   });
-  listen<TruckStatus>(nh, "truck_status", [this](auto& m) { arbiter_.setTruckState(toCore(m), now()); });
+  listen<TruckStatus>(nh, "truck_status",
+                      [this](auto& m, Stamp at) { arbiter_.setTruckState(toCore(m), at); });
 }
 
 void ArbiterRos::offerDriver(ros::NodeHandle& private_nh, supervision::Source driver) {
@@ -114,19 +125,14 @@ void ArbiterRos::checkClock() {
   tunnel_.reset();
 }
 
-void ArbiterRos::onProposal(supervision::Source source, const Proposal& message) {
-  arbiter_.setProposal(source, toCore(message), now());
-  decide();
-}
-
-void ArbiterRos::onPoints(const sensor_msgs::PointCloud2& message) {
+void ArbiterRos::setPoints(const sensor_msgs::PointCloud2& message, Stamp received) {
   const auto cloud = message.header.frame_id == kBaseFrame ? toCore(message) : nullptr;
   if (!cloud) {
     ROS_ERROR_THROTTLE(1.0,
                        "arbiter: a cloud that is not in base_link or has no x, y, z is passed over");
     return;
   }
-  arbiter_.setPoints(*cloud, toCore(message.header.stamp), now());
+  arbiter_.setPoints(*cloud, toCore(message.header.stamp), received);
 }
 
 bool ArbiterRos::onStop(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
@@ -138,26 +144,28 @@ bool ArbiterRos::onStop(std_srvs::Trigger::Request&, std_srvs::Trigger::Response
 }
 
 bool ArbiterRos::onReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+  inputs_.callAvailable();
   response.success = arbiter_.reset(now());
   response.message =
       response.success ? "reset" : "refused: the truck moves, or " + toString(last_.command.reason);
   return true;
 }
 
-void ArbiterRos::updateMotion() {
+void ArbiterRos::updateMotion(Stamp received) {
   const auto motion = motion_.motion();
   if (!motion) return;
-  arbiter_.setMotion(*motion, now());
+  arbiter_.setMotion(*motion, received);
   if (drivers::isFinite(*motion)) return;
   ++motion_refused_;
   ROS_ERROR_THROTTLE(1.0, "arbiter: odom or joint_states holds a number that is not finite");
 }
 
-void ArbiterRos::updateTunnel() {
-  if (const auto tunnel = tunnel_.take()) arbiter_.setTunnel(*tunnel, now());
+void ArbiterRos::updateTunnel(Stamp received) {
+  if (const auto tunnel = tunnel_.take()) arbiter_.setTunnel(*tunnel, received);
 }
 
 void ArbiterRos::decide() {
+  inputs_.callAvailable();
   checkClock();
   last_ = arbiter_.decide(now());
   command_publisher_.publish(boost::make_shared<TruckCommand>(toRos(last_.command)));

@@ -11,13 +11,20 @@
 
 namespace tunnel_pilot::shell {
 
-using ScanFilterNodelet = StageNodelet<ScanFilterRos>;
-using WallSegmentationNodelet = StageNodelet<WallSegmentationRos>;
-using CenterlineNodelet = StageNodelet<CenterlineRos>;
-using LidarDriverNodelet = StageNodelet<LidarDriverRos>;
-using PreviewDriverNodelet = StageNodelet<PreviewDriverRos>;
-using ArbiterNodelet = StageNodelet<ArbiterRos>;
-using MarkersNodelet = StageNodelet<MarkersRos>;
+// What waits for one another shares a lane: from a scan to lidar_driver's proposal, and from its points
+// to preview_driver's. The arbiter decides whatever the others do, and pictures need not come at once.
+constexpr LaneRule kScan{"scan", 0.0};
+constexpr LaneRule kTunnel{"tunnel", 0.0};
+constexpr LaneRule kArbiter{"arbiter", 0.0};
+constexpr LaneRule kMarkers{"markers", 0.02};
+
+using ScanFilterNodelet = StageNodelet<ScanFilterRos, kScan>;
+using WallSegmentationNodelet = StageNodelet<WallSegmentationRos, kTunnel>;
+using CenterlineNodelet = StageNodelet<CenterlineRos, kTunnel>;
+using PreviewDriverNodelet = StageNodelet<PreviewDriverRos, kTunnel>;
+using LidarDriverNodelet = StageNodelet<LidarDriverRos, kScan>;
+using ArbiterNodelet = StageNodelet<ArbiterRos, kArbiter>;
+using MarkersNodelet = StageNodelet<MarkersRos, kMarkers>;
 
 }  // namespace tunnel_pilot::shell
 

@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "tunnel_pilot/ros/conversions.h"
+
 namespace tunnel_pilot::shell {
 namespace {
 

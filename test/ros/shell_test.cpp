@@ -2,12 +2,18 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
+#include <functional>
 #include <limits>
+#include <memory>
+#include <stdexcept>
+#include <thread>
 
 #include "tunnel_pilot/can/memory_bus.h"
 #include "tunnel_pilot/ros/bus_tap.h"
 #include "tunnel_pilot/ros/clock_watch.h"
 #include "tunnel_pilot/ros/conversions.h"
+#include "tunnel_pilot/ros/lane.h"
 #include "tunnel_pilot/ros/motion_input.h"
 #include "tunnel_pilot/ros/parameters.h"
 #include "tunnel_pilot/ros/publisher_watch.h"
@@ -75,6 +81,57 @@ TEST(Stamps, PassToTheNanosecond) {
   EXPECT_EQ(1700000000123456789LL, toCore(time).count());
 }
 
+std::thread::id threadOf(Lane& lane) {
+  std::thread::id id;
+  lane.run([&] { id = std::this_thread::get_id(); });
+  return id;
+}
+
+TEST(NodeletLane, IsOneThreadForAllWhoNameIt) {
+  const auto lane = Lane::named("one");
+  EXPECT_EQ(lane, Lane::named("one"));
+  EXPECT_EQ(threadOf(*lane), threadOf(*Lane::named("one")));
+  EXPECT_NE(threadOf(*lane), threadOf(*Lane::named("another")));
+  EXPECT_NE(threadOf(*lane), std::this_thread::get_id());
+}
+
+TEST(NodeletLane, EndsWithWhoHoldsItLast) {
+  const std::weak_ptr<Lane> gone = Lane::named("one");
+  EXPECT_EQ(nullptr, gone.lock());
+}
+
+TEST(NodeletLane, PassesOnWhatItsWorkThrowsAndGoesOn) {
+  const auto lane = Lane::named("one");
+  EXPECT_THROW(lane->run([] { throw std::runtime_error("no"); }), std::runtime_error);
+  bool done = false;
+  lane->run([&] { done = true; });
+  EXPECT_TRUE(done);
+}
+
+class Note : public ros::CallbackInterface {
+ public:
+  Note(std::string& notes, char what) : notes_(notes), what_(what) {}
+  CallResult call() override {
+    notes_ += what_;
+    return Success;
+  }
+
+ private:
+  std::string& notes_;
+  char what_;
+};
+
+TEST(NodeletLane, WorksInTheOrderInWhichItWasAsked) {
+  Lane lane("one");
+  std::string notes;
+  lane.run([&] {
+    for (const char c : {'a', 'b', 'c'}) lane.queue().addCallback(boost::make_shared<Note>(notes, c));
+    notes += '-';  // what is asked for within work comes after it
+  });
+  lane.run([] {});
+  EXPECT_EQ("-abc", notes);
+}
+
 TEST(Conversions, ScanComesBackUnchanged) {
   sensor_msgs::LaserScan message;
   message.header.stamp = ros::Time(5, 7);
@@ -130,6 +187,74 @@ TEST(Conversions, CloudThatAnnouncesMoreThanItHoldsIsRefused) {
   message = toRos(cloud, Stamp{});
   message.fields.clear();
   EXPECT_EQ(nullptr, toCore(message));
+}
+
+// Other fields before and between, rows with something behind them.
+TEST(Conversions, ACloudOfAnotherLayoutIsRead) {
+  sensor_msgs::PointCloud2 message;
+  const auto field = [&](const char* name, std::uint8_t type, std::uint32_t offset) {
+    message.fields.emplace_back();
+    message.fields.back().name = name;
+    message.fields.back().datatype = type;
+    message.fields.back().offset = offset;
+    message.fields.back().count = 1;
+  };
+  field("ring", sensor_msgs::PointField::UINT16, 0);
+  field("z", sensor_msgs::PointField::FLOAT32, 2);
+  field("x", sensor_msgs::PointField::FLOAT32, 10);
+  field("y", sensor_msgs::PointField::FLOAT32, 6);
+  message.width = 2;
+  message.height = 2;
+  message.point_step = 15;
+  message.row_step = 33;
+  message.data.resize(66);
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    std::uint8_t* at = &message.data[i / 2 * 33 + i % 2 * 15];
+    const float z = 0.5F, x = 10.0F + static_cast<float>(i), y = -static_cast<float>(i);
+    std::memcpy(at + 2, &z, 4);
+    std::memcpy(at + 10, &x, 4);
+    std::memcpy(at + 6, &y, 4);
+  }
+  const auto cloud = toCore(message);
+  ASSERT_NE(nullptr, cloud);
+  ASSERT_EQ(4u, cloud->size());
+  EXPECT_EQ(2u, cloud->width);
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(10.0F + static_cast<float>(i), cloud->points[i].x);
+    EXPECT_EQ(-static_cast<float>(i), cloud->points[i].y);
+    EXPECT_EQ(0.5F, cloud->points[i].z);
+  }
+}
+
+TEST(Conversions, ACloudThatHoldsLessThanItSaysIsRefused) {
+  pcl::PointCloud<pcl::PointXYZ> cloud;
+  cloud.push_back({1.0F, 2.0F, 0.0F});
+  const sensor_msgs::PointCloud2 good = toRos(cloud, std::chrono::seconds(1));
+  const auto refused = [&](const std::function<void(sensor_msgs::PointCloud2&)>& spoil) {
+    sensor_msgs::PointCloud2 message = good;
+    spoil(message);
+    return toCore(message) == nullptr;
+  };
+  EXPECT_FALSE(refused([](auto&) {}));
+  EXPECT_TRUE(refused([](auto& m) { m.data.pop_back(); }));
+  EXPECT_TRUE(refused([](auto& m) { m.width = 2; }));
+  EXPECT_TRUE(refused([](auto& m) { m.height = 2; }));
+  EXPECT_TRUE(refused([](auto& m) { m.row_step = 1; }));
+  EXPECT_TRUE(refused([](auto& m) { m.point_step = 8; }));
+  EXPECT_TRUE(refused([](auto& m) { m.fields[1].offset = 0xFFFFFFFEU; }));
+  EXPECT_TRUE(refused([](auto& m) { m.fields[1].datatype = sensor_msgs::PointField::FLOAT64; }));
+  EXPECT_TRUE(refused([](auto& m) { m.fields[1].name = "w"; }));
+  EXPECT_TRUE(refused([](auto& m) { m.is_bigendian = true; }));
+}
+
+TEST(Conversions, ACloudOfNoPointsIsEmpty) {
+  sensor_msgs::PointCloud2 message = toRos(pcl::PointCloud<pcl::PointXYZ>(), std::chrono::seconds(1));
+  message.height = 4'000'000'000U;
+  message.width = 0;
+  message.row_step = 0;
+  const auto cloud = toCore(message);
+  ASSERT_NE(nullptr, cloud);
+  EXPECT_TRUE(cloud->empty());
 }
 
 TEST(Conversions, CommandComesBackUnchanged) {
