@@ -71,8 +71,6 @@ std::uint64_t ScanFilter::rejected() const {
 void ScanFilter::reset() {
   announced_ = false;
   last_stamp_.reset();
-  last_ranges_.clear();
-  identical_ = 0;
 }
 
 const ScanFilter::Result& ScanFilter::filter(const geometry::Scan& scan,

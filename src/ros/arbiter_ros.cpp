@@ -14,7 +14,6 @@ namespace tunnel_pilot::shell {
 namespace {
 
 constexpr double kDecisionPeriod = 0.02;  // [s]
-constexpr std::uint32_t kPending = 10;      // messages of a topic that wait for a decision
 
 supervision::Arbiter makeArbiter(const ros::NodeHandle& private_nh) {
   Parameters parameters(private_nh);
@@ -35,6 +34,7 @@ ArbiterRos::ArbiterRos(ros::NodeHandle nh, ros::NodeHandle private_nh)
   last_.command.stop = true;
   last_.command.reason = supervision::Reason::kStartUp;
   subscribe(nh);
+  subscribeInputs(nh);
   stop_service_ = private_nh.advertiseService("stop", &ArbiterRos::onStop, this);
   reset_service_ = private_nh.advertiseService("reset", &ArbiterRos::onReset, this);
   offerDriver(private_nh, supervision::Source::kLidarDriver);
@@ -49,57 +49,62 @@ ArbiterRos::ArbiterRos(ros::NodeHandle nh, ros::NodeHandle private_nh)
 }
 
 template <class Message, class Callback>
-void ArbiterRos::listen(ros::NodeHandle& nh, const std::string& topic, Callback callback) {
+void ArbiterRos::listen(ros::NodeHandle& nh, const std::string& topic, std::uint32_t queue,
+                        Callback callback) {
   const boost::function<void(const ros::MessageEvent<const Message>&)> call =
       [this, topic, callback](const ros::MessageEvent<const Message>& event) {
-        const Message& message = *event.getConstMessage();
         unheard_.erase(topic);
-        const Stamp latest = nowAfter(message.header.stamp);
         checkClock();
-        // In simulated time the clock may tell of the message's time later than the message comes.
-        const bool simulated = ros::Time::isSimTime();
-        callback(message, simulated ? latest : std::min(toCore(event.getReceiptTime()), latest));
+        callback(*event.getConstMessage(), std::min(toCore(event.getReceiptTime()), now()));
       };
-  subscribers_.push_back(nh.subscribe<Message>(topic, kPending, call, ros::VoidConstPtr(),
+  subscribers_.push_back(nh.subscribe<Message>(topic, queue, call, ros::VoidConstPtr(),
                                                ros::TransportHints().tcpNoDelay()));
 }
 
-void ArbiterRos::subscribe(ros::NodeHandle nh) {
+void ArbiterRos::subscribe(ros::NodeHandle& nh) {
   using supervision::Source;
-  unheard_ = {"points", "walls", "tunnel_state", "centerline", "odom", "joint_states"};
-  if (arbiter_.parameters().needs_truck_state) unheard_.insert("truck_status");
   for (const auto& [topic, source] : {std::pair("lidar_driver/proposal", Source::kLidarDriver),
                                       std::pair("preview_driver/proposal", Source::kPreviewDriver),
                                       std::pair("teleoperation/proposal", Source::kTeleoperation)}) {
-    listen<Proposal>(nh, topic, [this, from = source](auto& m, Stamp at) {
+    listen<Proposal>(nh, topic, 2, [this, from = source](auto& m, Stamp at) {
+      nowAfter(m.header.stamp);
       arbiter_.setProposal(from, toCore(m), at);
       decide();
     });
   }
-  listen<TunnelState>(nh, "tunnel_state", [this](auto& m, Stamp at) {
+  listen<TunnelState>(nh, "tunnel_state", 2, [this](auto& m, Stamp at) {
     inputs_.callAvailable();
     tunnel_.setState(toCore(m));
     updateTunnel(at);
   });
+}
+
+// What is read with each decision. It is not waited for the clock to tell of their time: messages of the
+// future would hold up the decision.
+void ArbiterRos::subscribeInputs(ros::NodeHandle nh) {
+  constexpr std::uint32_t kWaiting = 10;
+  unheard_ = {"points", "walls", "tunnel_state", "centerline", "odom", "joint_states"};
+  if (arbiter_.parameters().needs_truck_state) unheard_.insert("truck_status");
   nh.setCallbackQueue(&inputs_);
-  listen<Walls>(nh, "walls", [this](auto& m, Stamp at) { arbiter_.setWalls(toCore(m), at); });
-  listen<sensor_msgs::PointCloud2>(nh, "points", [this](auto& m, Stamp at) { setPoints(m, at); });
-  listen<ScanRejection>(nh, "scan_rejected", [this](auto& m, Stamp at) {
+  listen<Walls>(nh, "walls", kWaiting, [this](auto& m, Stamp at) { arbiter_.setWalls(toCore(m), at); });
+  listen<sensor_msgs::PointCloud2>(nh, "points", kWaiting,
+                                   [this](auto& m, Stamp at) { setPoints(m, at); });
+  listen<ScanRejection>(nh, "scan_rejected", kWaiting, [this](auto& m, Stamp at) {
     arbiter_.setRejection({static_cast<bool>(m.frozen)}, at);
   });
-  listen<nav_msgs::Path>(nh, "centerline", [this](auto& m, Stamp at) {
+  listen<nav_msgs::Path>(nh, "centerline", kWaiting, [this](auto& m, Stamp at) {
     tunnel_.setCenterline(toCore(m.header.stamp), toCore(m));
     updateTunnel(at);
   });
-  listen<nav_msgs::Odometry>(nh, "odom", [this](auto& m, Stamp at) {
+  listen<nav_msgs::Odometry>(nh, "odom", kWaiting, [this](auto& m, Stamp at) {
     motion_.setOdometry(m);
     updateMotion(at);
   });
-  listen<sensor_msgs::JointState>(nh, "joint_states", [this](auto& m, Stamp at) {
+  listen<sensor_msgs::JointState>(nh, "joint_states", kWaiting, [this](auto& m, Stamp at) {
     motion_.setJointState(m);
     updateMotion(at);
   });
-  listen<TruckStatus>(nh, "truck_status",
+  listen<TruckStatus>(nh, "truck_status", kWaiting,
                       [this](auto& m, Stamp at) { arbiter_.setTruckState(toCore(m), at); });
 }
 

@@ -83,8 +83,8 @@ class ScanFilter {
   /// next call; its points are a new cloud whenever somebody still holds the last one.
   const Result& filter(const geometry::Scan& scan, const geometry::Pose& sensor_in_base, Stamp now);
 
-  /// Forgets the announced geometry, the last stamp and the last ranges (after a clock jump). Counters
-  /// stay.
+  /// Forgets the announced geometry and the last stamp (after a clock jump). Counters stay, and so do
+  /// the last ranges: a sensor that is frozen stays so.
   void reset();
 
   std::uint64_t accepted() const { return counts_[0]; }

@@ -5,6 +5,7 @@
 #include <sensor_msgs/PointCloud2.h>
 #include <std_srvs/Trigger.h>
 
+#include <cstdint>
 #include <optional>
 #include <set>
 #include <string>
@@ -35,8 +36,9 @@ class ArbiterRos {
 
  private:
   template <class Message, class Callback>
-  void listen(ros::NodeHandle& nh, const std::string& topic, Callback callback);
-  void subscribe(ros::NodeHandle nh);
+  void listen(ros::NodeHandle& nh, const std::string& topic, std::uint32_t queue, Callback callback);
+  void subscribe(ros::NodeHandle& nh);
+  void subscribeInputs(ros::NodeHandle nh);
   void offerDriver(ros::NodeHandle& private_nh, supervision::Source driver);
   bool onStop(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
   bool onReset(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
