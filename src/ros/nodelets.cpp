@@ -11,18 +11,19 @@
 
 namespace tunnel_pilot::shell {
 
-// What waits for one another shares a lane: from a scan to lidar_driver's proposal, and from its points
-// to preview_driver's. The arbiter decides whatever the others do, and pictures need not come at once.
-constexpr LaneRule kScan{"scan", 0.0};
-constexpr LaneRule kTunnel{"tunnel", 0.0};
+// From the scan to preview_driver's proposal each stage waits for the one before, and a scan waits until
+// the last one is through, so that its tunnel never lags behind what lidar_driver answers beside it. The
+// arbiter decides whatever the others do, and pictures need not come at once.
+constexpr LaneRule kPerception{"perception", 0.0};
+constexpr LaneRule kLidarDriver{"lidar_driver", 0.0};
 constexpr LaneRule kArbiter{"arbiter", 0.0};
 constexpr LaneRule kMarkers{"markers", 0.02};
 
-using ScanFilterNodelet = StageNodelet<ScanFilterRos, kScan>;
-using WallSegmentationNodelet = StageNodelet<WallSegmentationRos, kTunnel>;
-using CenterlineNodelet = StageNodelet<CenterlineRos, kTunnel>;
-using PreviewDriverNodelet = StageNodelet<PreviewDriverRos, kTunnel>;
-using LidarDriverNodelet = StageNodelet<LidarDriverRos, kScan>;
+using ScanFilterNodelet = StageNodelet<ScanFilterRos, kPerception>;
+using WallSegmentationNodelet = StageNodelet<WallSegmentationRos, kPerception>;
+using CenterlineNodelet = StageNodelet<CenterlineRos, kPerception>;
+using PreviewDriverNodelet = StageNodelet<PreviewDriverRos, kPerception>;
+using LidarDriverNodelet = StageNodelet<LidarDriverRos, kLidarDriver>;
 using ArbiterNodelet = StageNodelet<ArbiterRos, kArbiter>;
 using MarkersNodelet = StageNodelet<MarkersRos, kMarkers>;
 
