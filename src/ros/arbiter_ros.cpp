@@ -3,7 +3,6 @@
 #include <ros/console.h>
 #include <tunnel_pilot/ScanRejection.h>
 
-#include <algorithm>
 #include <boost/make_shared.hpp>
 #include <utility>
 
@@ -34,7 +33,6 @@ ArbiterRos::ArbiterRos(ros::NodeHandle nh, ros::NodeHandle private_nh)
   last_.command.stop = true;
   last_.command.reason = supervision::Reason::kStartUp;
   subscribe(nh);
-  subscribeInputs(nh);
   stop_service_ = private_nh.advertiseService("stop", &ArbiterRos::onStop, this);
   reset_service_ = private_nh.advertiseService("reset", &ArbiterRos::onReset, this);
   offerDriver(private_nh, supervision::Source::kLidarDriver);
@@ -49,63 +47,49 @@ ArbiterRos::ArbiterRos(ros::NodeHandle nh, ros::NodeHandle private_nh)
 }
 
 template <class Message, class Callback>
-void ArbiterRos::listen(ros::NodeHandle& nh, const std::string& topic, std::uint32_t queue,
-                        Callback callback) {
-  const boost::function<void(const ros::MessageEvent<const Message>&)> call =
-      [this, topic, callback](const ros::MessageEvent<const Message>& event) {
+void ArbiterRos::listen(ros::NodeHandle& nh, const std::string& topic, Callback callback) {
+  const boost::function<void(const boost::shared_ptr<const Message>&)> call =
+      [this, topic, callback](const boost::shared_ptr<const Message>& message) {
         unheard_.erase(topic);
+        nowAfter(message->header.stamp);
         checkClock();
-        callback(*event.getConstMessage(), std::min(toCore(event.getReceiptTime()), now()));
+        callback(*message);
       };
-  subscribers_.push_back(nh.subscribe<Message>(topic, queue, call, ros::VoidConstPtr(),
-                                               ros::TransportHints().tcpNoDelay()));
+  subscribers_.push_back(
+      nh.subscribe<Message>(topic, 2, call, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
 }
 
 void ArbiterRos::subscribe(ros::NodeHandle& nh) {
   using supervision::Source;
+  unheard_ = {"points", "walls", "tunnel_state", "centerline", "odom", "joint_states"};
+  if (arbiter_.parameters().needs_truck_state) unheard_.insert("truck_status");
   for (const auto& [topic, source] : {std::pair("lidar_driver/proposal", Source::kLidarDriver),
                                       std::pair("preview_driver/proposal", Source::kPreviewDriver),
                                       std::pair("teleoperation/proposal", Source::kTeleoperation)}) {
-    listen<Proposal>(nh, topic, 2, [this, from = source](auto& m, Stamp at) {
-      nowAfter(m.header.stamp);
-      arbiter_.setProposal(from, toCore(m), at);
-      decide();
-    });
+    listen<Proposal>(nh, topic, [this, from = source](auto& m) { onProposal(from, m); });
   }
-  listen<TunnelState>(nh, "tunnel_state", 2, [this](auto& m, Stamp at) {
-    inputs_.callAvailable();
+  listen<Walls>(nh, "walls", [this](auto& m) { arbiter_.setWalls(toCore(m), now()); });
+  listen<sensor_msgs::PointCloud2>(nh, "points", [this](auto& m) { onPoints(m); });
+  listen<ScanRejection>(nh, "scan_rejected", [this](auto& m) {
+    arbiter_.setRejection({static_cast<bool>(m.frozen)}, now());
+  });
+  listen<TunnelState>(nh, "tunnel_state", [this](auto& m) {
     tunnel_.setState(toCore(m));
-    updateTunnel(at);
+    updateTunnel();
   });
-}
-
-// What is read with each decision. It is not waited for the clock to tell of their time: messages of the
-// future would hold up the decision.
-void ArbiterRos::subscribeInputs(ros::NodeHandle nh) {
-  constexpr std::uint32_t kWaiting = 10;
-  unheard_ = {"points", "walls", "tunnel_state", "centerline", "odom", "joint_states"};
-  if (arbiter_.parameters().needs_truck_state) unheard_.insert("truck_status");
-  nh.setCallbackQueue(&inputs_);
-  listen<Walls>(nh, "walls", kWaiting, [this](auto& m, Stamp at) { arbiter_.setWalls(toCore(m), at); });
-  listen<sensor_msgs::PointCloud2>(nh, "points", kWaiting,
-                                   [this](auto& m, Stamp at) { setPoints(m, at); });
-  listen<ScanRejection>(nh, "scan_rejected", kWaiting, [this](auto& m, Stamp at) {
-    arbiter_.setRejection({static_cast<bool>(m.frozen)}, at);
-  });
-  listen<nav_msgs::Path>(nh, "centerline", kWaiting, [this](auto& m, Stamp at) {
+  listen<nav_msgs::Path>(nh, "centerline", [this](auto& m) {
     tunnel_.setCenterline(toCore(m.header.stamp), toCore(m));
-    updateTunnel(at);
+    updateTunnel();
   });
-  listen<nav_msgs::Odometry>(nh, "odom", kWaiting, [this](auto& m, Stamp at) {
+  listen<nav_msgs::Odometry>(nh, "odom", [this](auto& m) {
     motion_.setOdometry(m);
-    updateMotion(at);
+    updateMotion();
   });
-  listen<sensor_msgs::JointState>(nh, "joint_states", kWaiting, [this](auto& m, Stamp at) {
+  listen<sensor_msgs::JointState>(nh, "joint_states", [this](auto& m) {
     motion_.setJointState(m);
-    updateMotion(at);
+    updateMotion();
   });
-  listen<TruckStatus>(nh, "truck_status", kWaiting,
-                      [this](auto& m, Stamp at) { arbiter_.setTruckState(toCore(m), at); });
+  listen<TruckStatus>(nh, "truck_status", [this](auto& m) { arbiter_.setTruckState(toCore(m), now()); });
 }
 
 void ArbiterRos::offerDriver(ros::NodeHandle& private_nh, supervision::Source driver) {
@@ -130,14 +114,19 @@ void ArbiterRos::checkClock() {
   tunnel_.reset();
 }
 
-void ArbiterRos::setPoints(const sensor_msgs::PointCloud2& message, Stamp received) {
+void ArbiterRos::onProposal(supervision::Source source, const Proposal& message) {
+  arbiter_.setProposal(source, toCore(message), now());
+  decide();
+}
+
+void ArbiterRos::onPoints(const sensor_msgs::PointCloud2& message) {
   const auto cloud = message.header.frame_id == kBaseFrame ? toCore(message) : nullptr;
   if (!cloud) {
     ROS_ERROR_THROTTLE(1.0,
                        "arbiter: a cloud that is not in base_link or has no x, y, z is passed over");
     return;
   }
-  arbiter_.setPoints(*cloud, toCore(message.header.stamp), received);
+  arbiter_.setPoints(*cloud, toCore(message.header.stamp), now());
 }
 
 bool ArbiterRos::onStop(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
@@ -149,28 +138,26 @@ bool ArbiterRos::onStop(std_srvs::Trigger::Request&, std_srvs::Trigger::Response
 }
 
 bool ArbiterRos::onReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
-  inputs_.callAvailable();
   response.success = arbiter_.reset(now());
   response.message =
       response.success ? "reset" : "refused: the truck moves, or " + toString(last_.command.reason);
   return true;
 }
 
-void ArbiterRos::updateMotion(Stamp received) {
+void ArbiterRos::updateMotion() {
   const auto motion = motion_.motion();
   if (!motion) return;
-  arbiter_.setMotion(*motion, received);
+  arbiter_.setMotion(*motion, now());
   if (drivers::isFinite(*motion)) return;
   ++motion_refused_;
   ROS_ERROR_THROTTLE(1.0, "arbiter: odom or joint_states holds a number that is not finite");
 }
 
-void ArbiterRos::updateTunnel(Stamp received) {
-  if (const auto tunnel = tunnel_.take()) arbiter_.setTunnel(*tunnel, received);
+void ArbiterRos::updateTunnel() {
+  if (const auto tunnel = tunnel_.take()) arbiter_.setTunnel(*tunnel, now());
 }
 
 void ArbiterRos::decide() {
-  inputs_.callAvailable();
   checkClock();
   last_ = arbiter_.decide(now());
   command_publisher_.publish(boost::make_shared<TruckCommand>(toRos(last_.command)));

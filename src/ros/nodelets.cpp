@@ -11,21 +11,13 @@
 
 namespace tunnel_pilot::shell {
 
-// From the scan to preview_driver's proposal each stage waits for the one before, and a scan waits until
-// the last one is through, so that its tunnel never lags behind what lidar_driver answers beside it. The
-// arbiter decides whatever the others do, and pictures need not come at once.
-constexpr LaneRule kPerception{"perception", 0.0};
-constexpr LaneRule kLidarDriver{"lidar_driver", 0.0};
-constexpr LaneRule kArbiter{"arbiter", 0.0};
-constexpr LaneRule kMarkers{"markers", 0.02};
-
-using ScanFilterNodelet = StageNodelet<ScanFilterRos, kPerception>;
-using WallSegmentationNodelet = StageNodelet<WallSegmentationRos, kPerception>;
-using CenterlineNodelet = StageNodelet<CenterlineRos, kPerception>;
-using PreviewDriverNodelet = StageNodelet<PreviewDriverRos, kPerception>;
-using LidarDriverNodelet = StageNodelet<LidarDriverRos, kLidarDriver>;
-using ArbiterNodelet = StageNodelet<ArbiterRos, kArbiter>;
-using MarkersNodelet = StageNodelet<MarkersRos, kMarkers>;
+using ScanFilterNodelet = StageNodelet<ScanFilterRos>;
+using WallSegmentationNodelet = StageNodelet<WallSegmentationRos>;
+using CenterlineNodelet = StageNodelet<CenterlineRos>;
+using LidarDriverNodelet = StageNodelet<LidarDriverRos>;
+using PreviewDriverNodelet = StageNodelet<PreviewDriverRos>;
+using ArbiterNodelet = StageNodelet<ArbiterRos>;
+using MarkersNodelet = StageNodelet<MarkersRos>;
 
 }  // namespace tunnel_pilot::shell
 

@@ -5,15 +5,11 @@
 #include <cstring>
 #include <functional>
 #include <limits>
-#include <memory>
-#include <stdexcept>
-#include <thread>
 
 #include "tunnel_pilot/can/memory_bus.h"
 #include "tunnel_pilot/ros/bus_tap.h"
 #include "tunnel_pilot/ros/clock_watch.h"
 #include "tunnel_pilot/ros/conversions.h"
-#include "tunnel_pilot/ros/lane.h"
 #include "tunnel_pilot/ros/motion_input.h"
 #include "tunnel_pilot/ros/parameters.h"
 #include "tunnel_pilot/ros/publisher_watch.h"
@@ -79,57 +75,6 @@ TEST(Stamps, PassToTheNanosecond) {
   const ros::Time time(1700000000, 123456789);
   EXPECT_EQ(time, toRos(toCore(time)));
   EXPECT_EQ(1700000000123456789LL, toCore(time).count());
-}
-
-std::thread::id threadOf(Lane& lane) {
-  std::thread::id id;
-  lane.run([&] { id = std::this_thread::get_id(); });
-  return id;
-}
-
-TEST(NodeletLane, IsOneThreadForAllWhoNameIt) {
-  const auto lane = Lane::named("one");
-  EXPECT_EQ(lane, Lane::named("one"));
-  EXPECT_EQ(threadOf(*lane), threadOf(*Lane::named("one")));
-  EXPECT_NE(threadOf(*lane), threadOf(*Lane::named("another")));
-  EXPECT_NE(threadOf(*lane), std::this_thread::get_id());
-}
-
-TEST(NodeletLane, EndsWithWhoHoldsItLast) {
-  const std::weak_ptr<Lane> gone = Lane::named("one");
-  EXPECT_EQ(nullptr, gone.lock());
-}
-
-TEST(NodeletLane, PassesOnWhatItsWorkThrowsAndGoesOn) {
-  const auto lane = Lane::named("one");
-  EXPECT_THROW(lane->run([] { throw std::runtime_error("no"); }), std::runtime_error);
-  bool done = false;
-  lane->run([&] { done = true; });
-  EXPECT_TRUE(done);
-}
-
-class Note : public ros::CallbackInterface {
- public:
-  Note(std::string& notes, char what) : notes_(notes), what_(what) {}
-  CallResult call() override {
-    notes_ += what_;
-    return Success;
-  }
-
- private:
-  std::string& notes_;
-  char what_;
-};
-
-TEST(NodeletLane, WorksInTheOrderInWhichItWasAsked) {
-  Lane lane("one");
-  std::string notes;
-  lane.run([&] {
-    for (const char c : {'a', 'b', 'c'}) lane.queue().addCallback(boost::make_shared<Note>(notes, c));
-    notes += '-';  // what is asked for within work comes after it
-  });
-  lane.run([] {});
-  EXPECT_EQ("-abc", notes);
 }
 
 TEST(Conversions, ScanComesBackUnchanged) {

@@ -1,11 +1,9 @@
 #pragma once
 
-#include <ros/callback_queue.h>
 #include <ros/node_handle.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <std_srvs/Trigger.h>
 
-#include <cstdint>
 #include <optional>
 #include <set>
 #include <string>
@@ -24,35 +22,31 @@ namespace tunnel_pilot::shell {
 /// `teleoperation/proposal`, `walls`, `points`, `scan_rejected`, `tunnel_state` with `centerline`,
 /// `odom`, `joint_states`, `truck_status`; publishes `command` and `arbiter_state`. Decides on every
 /// proposal and on a timer of 50 Hz (steady time, or simulated time with use_sim_time), so that silent
-/// inputs end in a stop, not in silence; what else has come is read then, with the time at which it
-/// came. Services ~stop and ~reset (std_srvs/Trigger) latch a stop and end it, for a truck without
-/// can_bridge; with it, use the bridge's. Services ~use/lidar_driver and ~use/preview_driver
-/// (std_srvs/Trigger) select the driver, driving or not; the first is selected at the start. Numbers of
-/// supervision::arbiterTunables() are changed while it runs by LiveTuning. Parameters:
-/// config/arbiter.yaml and `truck_file`. Throws config::ConfigError.
+/// inputs end in a stop, not in silence. Services ~stop and ~reset (std_srvs/Trigger) latch a stop and
+/// end it, for a truck without can_bridge; with it, use the bridge's. Services ~use/lidar_driver and
+/// ~use/preview_driver (std_srvs/Trigger) select the driver, driving or not; the first is selected at
+/// the start. Numbers of supervision::arbiterTunables() are changed while it runs by LiveTuning.
+/// Parameters: config/arbiter.yaml and `truck_file`. Throws config::ConfigError.
 class ArbiterRos {
  public:
   ArbiterRos(ros::NodeHandle nh, ros::NodeHandle private_nh);
 
  private:
   template <class Message, class Callback>
-  void listen(ros::NodeHandle& nh, const std::string& topic, std::uint32_t queue, Callback callback);
+  void listen(ros::NodeHandle& nh, const std::string& topic, Callback callback);
   void subscribe(ros::NodeHandle& nh);
-  void subscribeInputs(ros::NodeHandle nh);
   void offerDriver(ros::NodeHandle& private_nh, supervision::Source driver);
+  void onProposal(supervision::Source source, const Proposal& message);
   bool onStop(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
   bool onReset(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
-  void setPoints(const sensor_msgs::PointCloud2& message, Stamp received);
-  void updateMotion(Stamp received);
-  void updateTunnel(Stamp received);
+  void onPoints(const sensor_msgs::PointCloud2& message);
+  void updateMotion();
+  void updateTunnel();
   void checkClock();
   void decide();
   std::string unheardTopics() const;
   void fillStatus(Diagnostics::Status& status) const;
 
-  // What is taken note of by a decision; nobody is woken for it, but for tunnel_state, the last of a
-  // scan's.
-  ros::CallbackQueue inputs_;
   supervision::Arbiter arbiter_;
   supervision::Decision last_;
   std::optional<supervision::Reason> told_;  // in the log; none before the first decision

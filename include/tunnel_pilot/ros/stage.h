@@ -8,50 +8,24 @@
 #include <string>
 
 #include "tunnel_pilot/ros/heartbeat.h"
-#include "tunnel_pilot/ros/lane.h"
 
 namespace tunnel_pilot::shell {
 
-/// Where a nodelet runs.
-struct LaneRule {
-  const char* name;
-  double pace;  ///< [s] 0: woken by each message
-};
-
-/// A stage as nodelet: its callbacks run one at a time in the lane of that name, its heartbeat among
-/// them; it is made and ended there, too, so that none of them meets half a stage. A stage that refuses
-/// its parameters is not loaded; the log says why.
-template <class Stage, const LaneRule& kLane>
+/// A stage as nodelet: its callbacks run one at a time (single-threaded queue of the manager), its
+/// heartbeat among them. A stage
+/// that refuses its parameters is not loaded; the log says why.
+template <class Stage>
 class StageNodelet : public nodelet::Nodelet {
- public:
-  ~StageNodelet() override {
-    if (!lane_) return;
-    lane_->run([this] {
-      heartbeat_.reset();
-      stage_.reset();
-    });
-  }
-
- private:
   void onInit() override {
-    ros::NodeHandle nh = getNodeHandle();
-    ros::NodeHandle private_nh = getPrivateNodeHandle();
-    lane_ = Lane::named(kLane.name + (" of " + nh.getNamespace()),
-                        ros::WallDuration(kLane.pace));  // several pilots may share a manager
-    nh.setCallbackQueue(&lane_->queue());
-    private_nh.setCallbackQueue(&lane_->queue());
     try {
-      lane_->run([&] {
-        stage_ = std::make_unique<Stage>(nh, private_nh);
-        heartbeat_ = std::make_unique<Heartbeat>(nh, getName());
-      });
+      stage_ = std::make_unique<Stage>(getNodeHandle(), getPrivateNodeHandle());
+      heartbeat_ = std::make_unique<Heartbeat>(getNodeHandle(), getName());
     } catch (const std::exception& e) {
       NODELET_FATAL("%s", e.what());
       throw;
     }
   }
 
-  std::shared_ptr<Lane> lane_;
   std::unique_ptr<Stage> stage_;
   std::unique_ptr<Heartbeat> heartbeat_;
 };
