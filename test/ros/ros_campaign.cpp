@@ -226,17 +226,19 @@ class Campaign {
     bus_.setTime(now() + fromSeconds(simulator_->parameters().step));
     const auto& events = simulator_->step();
     const bool tick = simulator_->now() % kClockPeriod == Stamp::zero();
-    if (tick) {  // and at no other time: the bridge's periods begin with its ticks
-      rosgraph_msgs::Clock clock;
-      clock.clock = toRos(now());
-      clock_.publish(clock);
-    }
+    if (tick) publishClock(now());  // and at no other time: the bridge's periods begin with its ticks
     if (events.scan != nullptr) {
       geometry::Scan scan = *events.scan;
       scan.stamp += kStart;
       deliver(toRos(scan, "laser"));
     }
     if (tick) awaitBridge();
+  }
+
+  void publishClock(Stamp time) {
+    rosgraph_msgs::Clock clock;
+    clock.clock = toRos(time);
+    clock_.publish(clock);
   }
 
   // Time stands still until the bridge has said what is due, and has stopped when the arbiter has asked
@@ -255,6 +257,8 @@ class Campaign {
       ros::getGlobalCallbackQueue()->callAvailable();
       if (ros::SteadyTime::now() > limit) {
         ++record_.late_sets;
+        ROS_WARN("in vain: the bridge's last set %.3f s ago%s, %s", toSeconds(now() - bus_.lastSet()),
+                 stop_asked_ ? ", a stop asked for" : "", status_.reason_text.c_str());
         stop_asked_ = false;
         return;
       }
@@ -666,9 +670,7 @@ class Campaign {
     jumped_ = burst_until_;
     tally("clock jump");
     static const double kOffsets[] = {-900.0, -3.0, -0.05, -0.011, 0.05, 0.9, 1.5, 500.0};
-    rosgraph_msgs::Clock message;
-    message.clock = toRos(now() + fromSeconds(kOffsets[below(8)]));
-    clock_.publish(message);
+    publishClock(now() + fromSeconds(kOffsets[below(8)]));
     ros::WallDuration(0.002).sleep();
     bus_.pump();
   }
@@ -707,15 +709,21 @@ class Campaign {
   }
 
   // Meanwhile no clock is published: a process with a clock of its own finds it later when it goes on,
-  // once, and does not live through what it missed.
+  // once, and does not live through what it missed. It knows the time, too, before anybody tells it
+  // anything; here the arbiter, whom the same message tells, could be quicker with a stop than it is.
   void holdBridge() {
+    const pid_t nodelets = manager();
     bridge_.hold(true);
     const Stamp until = now() + fromSeconds(0.02 + 0.4 * uniform());
     while (now() < until || now() % kClockPeriod != Stamp::zero()) {
       bus_.setTime(now() + fromSeconds(simulator_->parameters().step));
       simulator_->step();
     }
+    if (nodelets > 0) kill(nodelets, SIGSTOP);
     bridge_.hold(false);
+    publishClock(now());
+    awaitBridge();
+    if (nodelets > 0) kill(nodelets, SIGCONT);
   }
 
   // The truck is alone for a while, in simulated time, then the new bridge speaks and is waited for
@@ -728,9 +736,7 @@ class Campaign {
       bus_.setTime(now() + fromSeconds(simulator_->parameters().step));
       simulator_->step();
       if (simulator_->now() % kClockPeriod != Stamp::zero()) continue;
-      rosgraph_msgs::Clock clock;
-      clock.clock = toRos(now());
-      clock_.publish(clock);
+      publishClock(now());
       ros::WallDuration(0.01).sleep();
       ros::getGlobalCallbackQueue()->callAvailable();
     }
