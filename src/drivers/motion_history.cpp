@@ -18,11 +18,13 @@ geometry::Pose advanced(const geometry::Pose& pose, double speed, double yaw_rat
   return pose.compose({chord * std::cos(0.5 * turn), chord * std::sin(0.5 * turn), turn});
 }
 
-void MotionHistory::add(const Motion& motion) {
-  if (!isFinite(motion) || (size_ > 0 && motion.stamp <= latest().stamp)) return;
+bool MotionHistory::add(const Motion& motion, Stamp now) {
+  if (!isFinite(motion) || motion.stamp > now + max_ahead_) return false;
+  if (size_ > 0 && motion.stamp <= latest().stamp) return false;
   newest_ = (newest_ + 1) % ring_.size();
   ring_[newest_] = motion;
   if (size_ < ring_.size()) ++size_;
+  return true;
 }
 
 const Motion& MotionHistory::sample(std::size_t age) const {

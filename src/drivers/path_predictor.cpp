@@ -60,13 +60,14 @@ void PathPredictor::reset() {
 bool PathPredictor::usable(const perception::Tunnel& tunnel, const Motion& motion, Stamp now) const {
   const Stamp age = now - tunnel.state.stamp;
   return tunnel.state.valid && !tunnel.centerline.empty() && isFinite(tunnel.state) &&
-         drivers::isFinite(motion) && age >= -MotionHistory::kReach &&
+         drivers::isFinite(motion) && motion.stamp <= now + MotionHistory::kMaxAhead &&
+         age >= -MotionHistory::kReach &&
          toSeconds(age) <= parameters_.max_tunnel_age;
 }
 
 std::optional<PathState> PathPredictor::predict(const perception::Tunnel& tunnel, const Motion& motion,
                                                 Stamp now) {
-  history_.add(motion);
+  history_.add(motion, now);
   if (!usable(tunnel, motion, now)) return std::nullopt;
   const std::optional<geometry::Pose> scan_pose = history_.poseAt(tunnel.state.stamp);
   if (!scan_pose) return std::nullopt;

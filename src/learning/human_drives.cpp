@@ -96,7 +96,7 @@ class Recording {
     next_tick_ = now + fromSeconds(1.0 / simulation::Pilot::kTickRate);
     bridge_.tick(now);
     if (!bridge_.motionFresh(now)) return;
-    history_.add(bridge_.motion());
+    history_.add(bridge_.motion(), now);
     demonstration_.addMotion(bridge_.motion());
     for (Lesson& lesson : demonstration_.take()) {
       if (count_++ % keep_every_ == 0) lessons_.push_back(std::move(lesson));

@@ -147,10 +147,11 @@ bool ArbiterRos::onReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Respons
 void ArbiterRos::updateMotion() {
   const auto motion = motion_.motion();
   if (!motion) return;
-  arbiter_.setMotion(*motion, now());
-  if (drivers::isFinite(*motion)) return;
+  if (arbiter_.setMotion(*motion, now())) return;
   ++motion_refused_;
-  ROS_ERROR_THROTTLE(1.0, "arbiter: odom or joint_states holds a number that is not finite");
+  ROS_ERROR_THROTTLE(1.0, "arbiter: odom or joint_states holds %s",
+                     drivers::isFinite(*motion) ? "a stamp from the future"
+                                                : "a number that is not finite");
 }
 
 void ArbiterRos::updateTunnel() {
@@ -188,7 +189,7 @@ void ArbiterRos::fillStatus(Diagnostics::Status& status) const {
   status.add("speed [m/s]", command.speed);
   status.add("stop", command.stop);
   status.add("sequence", command.sequence);
-  status.add("motion not finite", motion_refused_);
+  status.add("motion refused", motion_refused_);
   if (!tuning_.refusal().empty()) status.add("tuning refused", tuning_.refusal());
   if (!unheard_.empty()) status.add("nothing heard yet on", unheardTopics());
 }

@@ -28,7 +28,7 @@ void CenterlineRos::checkClock() {
 
 void CenterlineRos::onOdometry(const nav_msgs::Odometry& message) {
   checkClock();
-  odometry_.add(toMotion(message));
+  odometry_.add(toMotion(message), now());
 }
 
 void CenterlineRos::onWalls(const Walls& message) {

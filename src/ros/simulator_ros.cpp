@@ -303,7 +303,7 @@ void SimulatorRos::publishTruth() {
   motion.pose = truth.state.pose;
   motion.speed = truth.state.speed;
   motion.yaw_rate = truth.state.yaw_rate;
-  true_motion_.add(motion);
+  true_motion_.add(motion, motion.stamp);
 }
 
 void SimulatorRos::publishWalls() {

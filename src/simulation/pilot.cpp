@@ -97,7 +97,7 @@ void Pilot::tick(Stamp now) {
 void Pilot::takeMotion(Stamp now) {
   bridge_.tick(now);
   if (bridge_.motionFresh(now)) {
-    history_.add(bridge_.motion());
+    history_.add(bridge_.motion(), now);
     arbiter_.setMotion(bridge_.motion(), now);
   }
   using State = bridge::SafetyState;

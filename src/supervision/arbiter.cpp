@@ -53,7 +53,8 @@ Arbiter::Arbiter(const ArbiterParameters& parameters, const vehicle::TruckParame
       limiter_(parameters.limiter, truck.geometry),
       yaw_(parameters.yaw, truck.geometry),
       slip_compliance_(1.0 / (kGravity * truck.tyre.cornering_coefficient)),
-      steering_monitor_(truck.steering, parameters.tracking_tolerance, parameters.tracking_time) {}
+      steering_monitor_(truck.steering, parameters.tracking_tolerance, parameters.tracking_time),
+      history_(fromSeconds(parameters.max_future)) {}
 
 // ---- inputs
 
@@ -85,12 +86,15 @@ void Arbiter::setTunnel(const perception::Tunnel& tunnel, Stamp now) {
   profile_.build(centerline_, truck_.geometry, kProfileSpacing);
 }
 
-void Arbiter::setMotion(const drivers::Motion& motion, Stamp now) {
+bool Arbiter::setMotion(const drivers::Motion& motion, Stamp now) {
   motion_finite_ = drivers::isFinite(motion);
-  if (!motion_finite_) return;
-  if (!history_.empty()) yaw_.update(motion, toSeconds(motion.stamp - history_.latest().stamp));
-  history_.add(motion);
+  if (!motion_finite_) return false;
+  const Stamp last = history_.empty() ? motion.stamp : history_.latest().stamp;
+  if (!history_.empty() && motion.stamp <= last) return true;  // nothing new, and no sign of life
+  if (!history_.add(motion, now)) return false;
+  if (motion.stamp > last) yaw_.update(motion, toSeconds(motion.stamp - last));
   motion_received_ = now;
+  return true;
 }
 
 void Arbiter::setTruckState(const TruckState& state, Stamp now) {

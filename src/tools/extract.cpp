@@ -337,7 +337,8 @@ class Extraction {
           takeMotions();
         },
         [&](const nav_msgs::Odometry& odometry, const ros::Time&) {
-          poses_.add(tools::motionOf(odometry));
+          const drivers::Motion motion = tools::motionOf(odometry);
+          poses_.add(motion, motion.stamp);  // the recorder's clock may be another
           joiner_.take(odometry);
           takeMotions();
         });

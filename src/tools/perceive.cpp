@@ -91,7 +91,10 @@ class Perceiver {
   Perceiver(const simulation::PerceptionParameters& parameters, const geometry::Pose& sensor)
       : chain_(parameters), sensor_(sensor) {}
 
-  void takeOdometry(const nav_msgs::Odometry& message) { odometry_.add(tools::motionOf(message)); }
+  void takeOdometry(const nav_msgs::Odometry& message) {
+    const drivers::Motion motion = tools::motionOf(message);
+    odometry_.add(motion, motion.stamp);  // the recorder's clock may be another
+  }
 
   void takeScan(const sensor_msgs::LaserScan& message) {
     const geometry::Scan scan = tools::scanOf(message);

@@ -50,6 +50,7 @@ milliseconds are that much wider than in the campaign in virtual time ([fault_ca
 | judged | {judged['frames']} frames, {judged['pilot_frames']} under the pilot's identifiers, in {options.python} |
 | **unsafe frames** | **{unsafe}** |
 | waits of 1 s in vain for a frame of the bridge | {report['late_sets']} |
+| longest time between two of its sets, where it was not started anew | {judged['longest_silence_ms']:.0f} ms |
 | contacts of the truck with a wall | {report['contacts']} |
 | time | {report['simulated_seconds']:.0f} s simulated in {report['seconds']:.0f} s |
 ''')

@@ -7,6 +7,8 @@
 namespace tunnel_pilot::drivers {
 namespace {
 
+constexpr Stamp kLater = std::chrono::seconds(100);
+
 Motion at(double time, double x, double heading = 0.0) {
   Motion motion;
   motion.stamp = fromSeconds(time);
@@ -20,15 +22,15 @@ TEST(MotionHistory, HasNoPoseBeforeAnyMotion) { EXPECT_FALSE(MotionHistory().pos
 
 TEST(MotionHistory, InterpolatesBetweenSamples) {
   MotionHistory history;
-  history.add(at(1.0, 0.0));
-  history.add(at(1.1, 0.2));
+  history.add(at(1.0, 0.0), kLater);
+  history.add(at(1.1, 0.2), kLater);
   ASSERT_TRUE(history.poseAt(fromSeconds(1.05)));
   EXPECT_NEAR(history.poseAt(fromSeconds(1.05))->x, 0.1, 1e-9);
 }
 
 TEST(MotionHistory, ExtrapolatesWithTheEndsSpeedAndYawRate) {
   MotionHistory history;
-  history.add(at(1.0, 0.0));
+  history.add(at(1.0, 0.0), kLater);
   const auto pose = history.poseAt(fromSeconds(1.2));
   ASSERT_TRUE(pose);
   // An arc of 0.4 m that turns by 0.1 rad.
@@ -39,7 +41,7 @@ TEST(MotionHistory, ExtrapolatesWithTheEndsSpeedAndYawRate) {
 
 TEST(MotionHistory, HasNoPoseBeyondItsReach) {
   MotionHistory history;
-  history.add(at(1.0, 0.0));
+  history.add(at(1.0, 0.0), kLater);
   EXPECT_TRUE(history.poseAt(fromSeconds(1.29)));
   EXPECT_FALSE(history.poseAt(fromSeconds(1.31)));
   EXPECT_FALSE(history.poseAt(fromSeconds(0.69)));
@@ -47,15 +49,30 @@ TEST(MotionHistory, HasNoPoseBeyondItsReach) {
 
 TEST(MotionHistory, IgnoresOldAndNonFiniteMotion) {
   MotionHistory history;
-  history.add(at(1.0, 0.0));
-  history.add(at(0.9, 5.0));
-  history.add(at(1.1, std::numeric_limits<double>::quiet_NaN()));
+  history.add(at(1.0, 0.0), kLater);
+  history.add(at(0.9, 5.0), kLater);
+  history.add(at(1.1, std::numeric_limits<double>::quiet_NaN()), kLater);
   EXPECT_EQ(history.latest().stamp, fromSeconds(1.0));
+}
+
+TEST(MotionHistory, IsNotStoppedByMotionFromTheFuture) {
+  MotionHistory history;
+  EXPECT_TRUE(history.add(at(1.0, 0.0), fromSeconds(1.0)));
+  EXPECT_FALSE(history.add(at(1.1, 9.0), fromSeconds(1.04)));
+  EXPECT_FALSE(history.add(at(1e5, 9.0), fromSeconds(1.04)));
+  EXPECT_TRUE(history.add(at(1.02, 0.04), fromSeconds(1.04)));
+  EXPECT_EQ(history.latest().stamp, fromSeconds(1.02));
+}
+
+TEST(MotionHistory, TakesMotionAsFarAheadAsItIsTold) {
+  MotionHistory history(std::chrono::milliseconds(200));
+  EXPECT_TRUE(history.add(at(1.2, 0.0), fromSeconds(1.0)));
+  EXPECT_FALSE(history.add(at(1.5, 0.0), fromSeconds(1.2)));
 }
 
 TEST(MotionHistory, KeepsTheLastSecondsWhenItsRingHasGoneRound) {
   MotionHistory history;
-  for (int i = 0; i < 500; ++i) history.add(at(0.02 * i, 0.04 * i));
+  for (int i = 0; i < 500; ++i) history.add(at(0.02 * i, 0.04 * i), kLater);
   const auto pose = history.poseAt(fromSeconds(9.51));
   ASSERT_TRUE(pose);
   EXPECT_NEAR(pose->x, 19.02, 1e-9);

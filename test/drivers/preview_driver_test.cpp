@@ -79,6 +79,15 @@ TEST(PreviewDriver, ProposesNothingFromNumbersThatAreNone) {
   EXPECT_FALSE(driver().propose(tunnelAt(1.0), motion, fromSeconds(1.05)).valid);
 }
 
+TEST(PreviewDriver, MotionFromTheFutureStopsOneProposalOnly) {
+  PreviewDriver preview = driver();
+  EXPECT_FALSE(preview.propose(tunnelAt(1.0), motionAt(1e5), fromSeconds(1.05)).valid);
+  const Proposal after = preview.propose(tunnelAt(1.03, 0.5), motionAt(1.06), fromSeconds(1.08));
+  ASSERT_TRUE(after.valid);
+  EXPECT_EQ(after.articulation_angle,
+            driver().propose(tunnelAt(1.03, 0.5), motionAt(1.06), fromSeconds(1.08)).articulation_angle);
+}
+
 TEST(PreviewDriver, SteersATruckWithoutAnyDelayToo) {
   PreviewDriverParameters p = parameters();
   p.truck.steering.dead_time = 0.0;

@@ -430,7 +430,7 @@ INSTANTIATE_TEST_SUITE_P(
 TEST_F(OwnTruckTest, MotionThatIsNoNumberStopsAtOnceAndIsCounted) {
   truck().spoil = onOdometry([](auto& o) { o.twist.twist.linear.x = kNan; });
   EXPECT_TRUE(truck().runUntil([] { return truck().command.stop; }, 0.06)) << "0.1 s is silence's";
-  EXPECT_TRUE(truck().runUntil([] { return truck().says("arbiter", "motion not finite=1"); }, 30.0));
+  EXPECT_TRUE(truck().runUntil([] { return truck().says("arbiter", "motion refused=1"); }, 30.0));
 }
 
 TEST_F(OwnTruckTest, ASecondPublisherOfScansStops) {

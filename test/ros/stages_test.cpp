@@ -318,6 +318,18 @@ TEST_F(CenterlineTest, FollowsOneWallAfterBothWereSeenButNotAcrossAJumpOfTheCloc
   EXPECT_EQ(TunnelState::REASON_NEVER_PAIRED, state.reason);
 }
 
+TEST_F(CenterlineTest, OdometryFromTheFutureHidesNoneThatComesAfterIt) {
+  auto future = odometryAt(1e5, 0.0);
+  future.pose.pose.position.x = 1e300;
+  for (int i = 0; i < 20; ++i) {
+    const double stamp = 1000.0 + kPeriod * i;
+    setTime(stamp);
+    send(odometry_, odometryAt(stamp, 0.0));
+    if (i == 3) send(odometry_, future);
+    EXPECT_TRUE(answerTo(tunnelWalls(stamp)).valid) << i;
+  }
+}
+
 TunnelState stateAt(double stamp, bool valid) {
   TunnelState state;
   state.header.stamp = ros::Time(stamp);

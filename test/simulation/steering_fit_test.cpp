@@ -133,7 +133,7 @@ class SteppingPilot {
     const SafetyState state = bridge_.status().state;
     if (state == SafetyState::kStandby) bridge_.engage(now);
     if (bridge_.motionFresh(now)) {
-      history_.add(bridge_.motion());
+      history_.add(bridge_.motion(), now);
       arbiter_.setMotion(bridge_.motion(), now);
     }
     arbiter_.setTruckState({driving(), state == SafetyState::kStopping || state == SafetyState::kStopped,

@@ -513,6 +513,28 @@ TEST(Arbiter, MotionThatIsNoNumberStopsInTheSameCycle) {
   EXPECT_TRUE(bench.arbiter->decide(bench.now).command.stop);
 }
 
+TEST(Arbiter, MotionFromTheFutureIsRefusedAndHidesNoneThatComesAfterIt) {
+  ArbiterBench bench;
+  bench.drive();
+  drivers::Motion bad = bench.motion;
+  bad.stamp = bench.now + std::chrono::hours(27);
+  bad.pose.x = 1e300;
+  EXPECT_FALSE(bench.arbiter->setMotion(bad, bench.now));
+  for (int i = 0; i < 50; ++i) EXPECT_FALSE(bench.cycle().command.stop);
+  EXPECT_FALSE(bench.cycle().degraded);
+}
+
+TEST(Arbiter, MotionFromTheFutureIsNoSignOfLife) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.give_motion = false;
+  drivers::Motion bad = bench.motion;
+  bad.stamp = bench.now + std::chrono::hours(27);
+  bench.arbiter->setMotion(bad, bench.now);
+  EXPECT_NEAR(secondsToStop(bench), 0.12, 0.021);
+  EXPECT_EQ(bench.cycle().command.reason, Reason::kMotionStale);
+}
+
 TEST(Arbiter, AProposalThatIsNoNumberFromTheOnlySourceStopsInTheSameCycle) {
   ArbiterBench bench;
   bench.drive();

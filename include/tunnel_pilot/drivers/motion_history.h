@@ -11,8 +11,15 @@ namespace tunnel_pilot::drivers {
 /// The last seconds of the truck's own motion, to bring what a scan measured to the present.
 class MotionHistory {
  public:
-  /// Takes a motion newer than the last one; an older or non-finite one is ignored. Allocation-free.
-  void add(const Motion& motion);
+  static constexpr Stamp kReach = std::chrono::milliseconds(300);
+  static constexpr Stamp kMaxAhead = std::chrono::milliseconds(50);
+
+  explicit MotionHistory(Stamp max_ahead = kMaxAhead) : max_ahead_(max_ahead) {}
+
+  /// Takes a motion newer than the last one. False: it is older, not finite, or farther ahead of `now`
+  /// than `max_ahead`, and is left out; one from the future would keep out all that come after it.
+  /// Allocation-free.
+  bool add(const Motion& motion, Stamp now);
   void clear() { size_ = 0; }
 
   bool empty() const { return size_ == 0; }
@@ -22,11 +29,10 @@ class MotionHistory {
   /// extrapolated with the end's speed and yaw rate. None farther away or without any motion.
   std::optional<geometry::Pose> poseAt(Stamp stamp) const;
 
-  static constexpr Stamp kReach = std::chrono::milliseconds(300);
-
  private:
   const Motion& sample(std::size_t age) const;  ///< 0: the newest
 
+  Stamp max_ahead_;
   std::array<Motion, 64> ring_{};
   std::size_t newest_ = 0;
   std::size_t size_ = 0;

@@ -115,7 +115,9 @@ class Arbiter {
   void setRejection(const ScanRejection& rejection, Stamp now);
   void setWalls(const perception::Walls& walls, Stamp now);
   void setTunnel(const perception::Tunnel& tunnel, Stamp now);
-  void setMotion(const drivers::Motion& motion, Stamp now);
+  /// False: it is refused, because it is not finite, which stops the truck, or because its stamp lies
+  /// farther ahead of `now` than max_future.
+  bool setMotion(const drivers::Motion& motion, Stamp now);
   void setTruckState(const TruckState& state, Stamp now);
 
   /// Returns of an accepted scan, in scan order, in base_link: any range of points with x and y members
