@@ -228,6 +228,34 @@ TEST(ArbiterEdge, AfterAClockJumpMotionIsWaitedForAsAtTheStart) {
   EXPECT_EQ(bench.cycle().command.reason, Reason::kStartUp);
 }
 
+TEST(ArbiterEdge, AfterAClockJumpNobodyIsSlowForWhatWasBefore) {
+  ArbiterBench bench;
+  bench.cycles(5);
+  bench.give_scan = false;
+  ASSERT_TRUE(bench.cycles(8).degraded);
+  bench.arbiter->clockJumped();
+  bench.give_scan = true;
+  EXPECT_FALSE(bench.cycles(2).degraded);
+}
+
+TEST(ArbiterEdge, AfterAClockJumpScansThatShowAnObstacleAreCountedAnew) {
+  ArbiterBench bench;
+  bench.cycles(5);
+  bench.obstacle = 3.0;
+  const int too_few = bench.parameters.obstacle_scans - 1;
+  ASSERT_NE(bench.cycles(too_few).command.reason, Reason::kObstacle);
+  bench.arbiter->clockJumped();
+  EXPECT_NE(bench.cycles(too_few).command.reason, Reason::kObstacle);
+  EXPECT_EQ(bench.cycle().command.reason, Reason::kObstacle);
+}
+
+TEST(ArbiterEdge, ASpeedThatNoSourceAsksForIsNobodys) {
+  ArbiterBench bench;
+  bench.speed = 20.0;
+  bench.drive();
+  EXPECT_EQ(bench.cycle().speed_source, Source::kNone);
+}
+
 // Where the corridor's left edge ends of a truck in a bend, which turns by this share of what its hinge
 // says.
 double endOfCorridor(double share) {

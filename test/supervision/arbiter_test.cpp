@@ -323,6 +323,15 @@ TEST(Arbiter, DriversThatDisagreeNowAndThenDriveOn) {
   }
 }
 
+TEST(Arbiter, ADriverThatIsSelectedAnewHasNotDisagreedYet) {
+  ArbiterBench bench;
+  bench.drive();
+  const double beyond = bench.parameters.disagreement_angle + 0.001;
+  EXPECT_FALSE(cyclesWith(bench, 10, 1.0, beyond).degraded);
+  ASSERT_TRUE(bench.arbiter->selectDriver(Source::kLidarDriver));
+  EXPECT_FALSE(cyclesWith(bench, 9, 1.0, beyond).degraded);
+}
+
 // Each pair of sources, each way: the hand-over stays within the rate limit.
 TEST(Arbiter, AHandOverIsNoJump) {
   const std::vector<Source> sources = {Source::kPreviewDriver, Source::kLidarDriver,
@@ -740,7 +749,9 @@ TEST(Arbiter, TellsCorridorClearanceAndDistances) {
   EXPECT_NEAR(decision.clearance_right, 0.975, 0.02);
   EXPECT_GT(decision.free_distance, 20.0);
   EXPECT_NEAR(decision.stopping_distance, 3.0 * 0.55 + 4.5, 1e-9);
-  EXPECT_FALSE(decision.corridor_left.empty());
+  ASSERT_FALSE(decision.corridor_left.empty());
+  ASSERT_FALSE(decision.corridor_right.empty());
+  EXPECT_GT(decision.corridor_left.back().y(), decision.corridor_right.back().y() + 2.0);
 }
 
 TEST(Arbiter, PointsOfOneScanWithWallsOfAnotherAreNotCompared) {
