@@ -61,8 +61,7 @@ bool PathPredictor::usable(const perception::Tunnel& tunnel, const Motion& motio
   const Stamp age = now - tunnel.state.stamp;
   return tunnel.state.valid && !tunnel.centerline.empty() && isFinite(tunnel.state) &&
          drivers::isFinite(motion) && motion.stamp <= now + MotionHistory::kMaxAhead &&
-         age >= -MotionHistory::kReach &&
-         toSeconds(age) <= parameters_.max_tunnel_age;
+         age >= -MotionHistory::kReach && toSeconds(age) <= parameters_.max_tunnel_age;
 }
 
 std::optional<PathState> PathPredictor::predict(const perception::Tunnel& tunnel, const Motion& motion,

@@ -153,11 +153,12 @@ ScanFilter::Rejection ScanFilter::checkRanges(const geometry::Scan& scan) {
     usable += static_cast<int>(r >= low) & static_cast<int>(r <= high);
   }
   const int size = static_cast<int>(scan.ranges.size());
-  identical_ = sameBytes(scan.ranges, last_ranges_) ? identical_ + 1 : 1;
-  last_ranges_ = scan.ranges;
   if (nan == size) return Rejection::kAllNan;
   if (infinite == size) return Rejection::kAllInfinite;
   if (negative > 0) return Rejection::kNegative;
+  // Compared with the last that could be used: one that cannot, in between, freshens no frozen ones.
+  identical_ = sameBytes(scan.ranges, last_ranges_) ? identical_ + 1 : 1;
+  last_ranges_ = scan.ranges;
   if (identical_ >= parameters_.frozen_count) return Rejection::kFrozen;
   return usable == 0 ? Rejection::kNoReturns : Rejection::kNone;
 }

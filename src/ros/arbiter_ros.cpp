@@ -149,9 +149,9 @@ void ArbiterRos::updateMotion() {
   if (!motion) return;
   if (arbiter_.setMotion(*motion, now())) return;
   ++motion_refused_;
-  ROS_ERROR_THROTTLE(1.0, "arbiter: odom or joint_states holds %s",
-                     drivers::isFinite(*motion) ? "a stamp from the future"
-                                                : "a number that is not finite");
+  ROS_ERROR_THROTTLE(
+      1.0, "arbiter: odom or joint_states holds %s",
+      drivers::isFinite(*motion) ? "a stamp from the future" : "a number that is not finite");
 }
 
 void ArbiterRos::updateTunnel() {

@@ -75,7 +75,8 @@ ros::Time toRos(Stamp stamp) {
 Stamp now() { return toCore(ros::Time::now()); }
 
 Stamp nowAfter(const ros::Time& stamp) {
-  if (!ros::Time::isSimTime()) return now();
+  constexpr double kOvertaken = 0.05;  // [s] farther ahead it is not the clock that is late
+  if (!ros::Time::isSimTime() || (stamp - ros::Time::now()).toSec() > kOvertaken) return now();
   const ros::SteadyTime end = ros::SteadyTime::now() + ros::WallDuration(0.05);
   while (ros::Time::now() < stamp && ros::SteadyTime::now() < end) ros::WallDuration(0.0002).sleep();
   return now();

@@ -232,6 +232,23 @@ TEST(ScanFilter, ASensorThatWasFrozenStaysSoOverAReset) {
   EXPECT_EQ(judge(filter, scan), Rejection::kFrozen);
 }
 
+// Found there, too.
+TEST(ScanFilter, AScanThatCannotBeUsedFreshensNoFrozenSensor) {
+  ScanFilter filter(parameters());
+  geometry::Scan scan = corridorScan();
+  EXPECT_EQ(judge(filter, scan), Rejection::kNone);
+  for (const auto& [bad, why] :
+       {std::pair(-1.0F, Rejection::kNegative), std::pair(kNan, Rejection::kAllNan),
+        std::pair(kInf, Rejection::kAllInfinite)}) {
+    geometry::Scan spoilt = scan;
+    spoilt.ranges.assign(scan.ranges.size(), bad);
+    spoilt.stamp += fromSeconds(0.03);
+    EXPECT_EQ(judge(filter, spoilt), why);
+    scan.stamp += fromSeconds(0.03);
+    EXPECT_EQ(judge(filter, scan), Rejection::kFrozen);
+  }
+}
+
 TEST(ScanFilter, FrozenIsSeenThroughNanBeamsToo) {
   ScanFilter filter(parameters());
   geometry::Scan scan = corridorScan();

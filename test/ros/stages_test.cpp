@@ -140,6 +140,16 @@ TEST_F(ScanFilterTest, RejectsAScanThatComesTooLate) {
   expectRejected(scan, "too old");
 }
 
+TEST_F(ScanFilterTest, RejectsAScanFromTheFutureThoughItsTimeComesSoon) {
+  driveUntilAccepted();
+  const double ahead = nextTime() + 0.04 + 0.1;
+  send(scan_, tunnelScan(ahead));
+  ros::WallDuration(0.02).sleep();  // in which it is judged
+  time_ = ahead;
+  ASSERT_TRUE(accepts(tunnelScan(nextTime())));
+  EXPECT_FALSE(points_.has(ros::Time(ahead)));
+}
+
 TEST_F(ScanFilterTest, RejectsAnIdenticalScan) {
   driveUntilAccepted();
   auto scan = tunnelScan(nextTime());

@@ -37,7 +37,8 @@ ros::Time toRos(Stamp stamp);
 Stamp now();
 
 /// The same, on receipt of a message that was stamped then. In simulated time a message may overtake the
-/// clock, which comes over another connection: it is waited for, at most 50 ms of steady time.
+/// clock, which comes over another connection: it is waited for, at most 50 ms of steady time, unless
+/// the stamp is more than 50 ms ahead; that is what the message says, and waiting would make it true.
 Stamp nowAfter(const ros::Time& stamp);
 
 geometry::Pose toCore(const geometry_msgs::Pose& pose);
