@@ -14,6 +14,7 @@ namespace {
 constexpr double kDegree = 0.017453292519943295;  // [rad]
 constexpr double kNetworkFirst = -95.0 * kDegree;
 constexpr double kNetworkIncrement = 0.25 * kDegree;
+constexpr double kTurn = 360.0 * kDegree;
 constexpr double kNeededView = 90.0 * kDegree;  // either side
 constexpr double kSideSector = 30.0 * kDegree;  // from here to kNeededView
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
@@ -23,10 +24,13 @@ bool sameBytes(const std::vector<float>& a, const std::vector<float>& b) {
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
 }
 
-bool wellFormed(const geometry::Scan& scan) {
-  return std::isfinite(scan.angle_min) && std::isfinite(scan.angle_increment) &&
-         scan.angle_increment > 0.0 && std::isfinite(scan.range_min) && scan.range_min >= 0.0 &&
-         scan.range_max > scan.range_min;
+// Written so that numbers that are none fail.
+bool wellFormed(const geometry::Scan& scan, const geometry::Pose& sensor) {
+  const bool angles = std::abs(scan.angle_min) <= kTurn && std::abs(scan.angleMax()) <= kTurn &&
+                      scan.angle_increment > 0.0 && scan.angle_increment <= kTurn;
+  return angles && std::isfinite(scan.range_min) && scan.range_min >= 0.0 &&
+         scan.range_max > scan.range_min && std::isfinite(sensor.x) && std::isfinite(sensor.y) &&
+         std::isfinite(sensor.heading);
 }
 
 std::uint8_t sectorOf(double angle) {
@@ -106,7 +110,7 @@ ScanFilter::Rejection ScanFilter::check(const geometry::Scan& scan, const geomet
 
 ScanFilter::Rejection ScanFilter::checkGeometry(const geometry::Scan& scan,
                                                 const geometry::Pose& sensor) const {
-  if (!wellFormed(scan)) return Rejection::kMalformed;
+  if (!wellFormed(scan, sensor)) return Rejection::kMalformed;
   if (scan.ranges.size() < 2) return Rejection::kWrongSize;
   const double announced_end = scan.announced_angle_max;
   if (!std::isnan(announced_end) &&
@@ -303,7 +307,7 @@ std::string toString(ScanFilter::Rejection rejection) {
     case Rejection::kNone:
       return "accepted";
     case Rejection::kMalformed:
-      return "angle increment or range limits make no sense";
+      return "angles, range limits or the sensor's pose make no sense";
     case Rejection::kWrongSize:
       return "number of ranges does not suit the angles";
     case Rejection::kFieldOfView:

@@ -150,9 +150,22 @@ TEST(ScanFilter, SenselessHeadersAreMalformed) {
   EXPECT_EQ(with(&geometry::Scan::angle_increment, 0.0), Rejection::kMalformed);
   EXPECT_EQ(with(&geometry::Scan::angle_increment, -0.004), Rejection::kMalformed);
   EXPECT_EQ(with(&geometry::Scan::angle_increment, nan), Rejection::kMalformed);
+  EXPECT_EQ(with(&geometry::Scan::angle_increment, 1e308), Rejection::kMalformed);
   EXPECT_EQ(with(&geometry::Scan::angle_min, nan), Rejection::kMalformed);
+  EXPECT_EQ(with(&geometry::Scan::angle_min, -1e308), Rejection::kMalformed);
   EXPECT_EQ(with(&geometry::Scan::range_min, nan), Rejection::kMalformed);
   EXPECT_EQ(with(&geometry::Scan::range_max, 0.01), Rejection::kMalformed);
+}
+
+TEST(ScanFilter, ASensorsPoseThatIsNoNumberIsMalformed) {
+  const geometry::Scan scan = corridorScan();
+  for (double geometry::Pose::*field :
+       {&geometry::Pose::x, &geometry::Pose::y, &geometry::Pose::heading}) {
+    ScanFilter filter(parameters());
+    geometry::Pose sensor = kLidar;
+    sensor.*field = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_EQ(filter.filter(scan, sensor, scan.stamp).rejection, Rejection::kMalformed);
+  }
 }
 
 TEST(ScanFilter, AnotherGeometryThanTheFirstIsRejectedUntilReset) {

@@ -558,6 +558,16 @@ TEST(Arbiter, AProposalThatIsNoNumberFromTheOnlySourceStopsInTheSameCycle) {
 
 // ---- how a stop steers
 
+TEST(Arbiter, AStopIsWhatLimitsTheSpeed) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.arbiter->requestStop(bench.now);
+  const Decision& decision = bench.cycle();
+  EXPECT_EQ(decision.limited_by, SpeedLimit::kStop);
+  EXPECT_EQ(decision.speed_source, Source::kNone);
+  EXPECT_EQ(decision.command.speed, 0.0);
+}
+
 TEST(Arbiter, AStopSteersOnTheBestHealthySource) {
   ArbiterBench bench;
   bench.drive();

@@ -380,6 +380,52 @@ TEST(Envelope, TheCorridorIsCutAcrossEachOfTheBodies) {
               0.1);
 }
 
+TEST(Envelope, EachScansCorridorIsDrawnAnew) {
+  Check check;
+  const std::size_t size = check.of(straightScene(0.0)).corridor_left.size();
+  EXPECT_EQ(check.of(straightScene(0.0)).corridor_left.size(), size);
+  EXPECT_EQ(check.envelope.result().corridor_right.size(), size);
+}
+
+// A lone return this far outside of the corridor's edge, between each two stations ahead whose edge
+// changes: at how many of these places does it end the free distance, and of how many?
+std::pair<int, int> obstaclesBeyond(double outside, bool left) {
+  Check check;
+  check.commanded = left ? -0.6 : 0.6;  // the outer edge widens along the way
+  check.parameters.envelope.obstacle_points = 1;
+  check.envelope = Envelope(check.parameters.envelope, check.parameters.limiter, check.truck);
+  Scene scene = straightScene(0.0, 0.0, 30.0);
+  scene.tunnel.centerline = geometry::Path();  // steered as it is, not along a path
+  scene.points.clear();
+  const Envelope::Result drawn = check.of(scene);
+  const auto& edge = left ? drawn.corridor_left : drawn.corridor_right;
+  int found = 0;
+  int tried = 0;
+  for (std::size_t i = 0; i + 1 < edge.size(); ++i) {
+    const geometry::Point along = edge[i + 1] - edge[i];
+    if (edge[i].x() < 0.0 || edge[i].x() > 8.0) continue;
+    const geometry::Point out =
+        (left ? 1.0 : -1.0) * geometry::Point(-along.y(), along.x()).normalized();
+    for (const double t : {0.25, 0.75}) {
+      const geometry::Point p = edge[i] + t * along + outside * out;
+      scene.points = {{p.x(), p.y()}};
+      found += static_cast<int>(check.of(scene).free_until == Envelope::End::kObstacle);
+      ++tried;
+    }
+  }
+  return {found, tried};
+}
+
+TEST(Envelope, BetweenTwoStationsTheCorridorsEdgesAreStraight) {
+  const double margin = Check().parameters.envelope.margin;
+  for (const bool left : {true, false}) {
+    const auto [inside, places] = obstaclesBeyond(margin - 0.03, left);
+    EXPECT_GT(places, 10);
+    EXPECT_EQ(inside, places) << left;
+    EXPECT_EQ(obstaclesBeyond(margin + 0.03, left).first, 0) << left;
+  }
+}
+
 TEST(Envelope, StoppingDistanceIsReactionAndBraking) {
   Check check;
   EnvelopeParameters p = check.parameters.envelope;

@@ -43,7 +43,7 @@ class ScanFilter {
  public:
   enum class Rejection : std::uint8_t {
     kNone = 0,             ///< accepted
-    kMalformed = 1,        ///< non-finite or non-positive angle increment or range limits
+    kMalformed = 1,        ///< angles beyond a turn, range limits that are none, or a pose not finite
     kWrongSize = 2,        ///< number of ranges does not suit the announced angles
     kFieldOfView = 3,      ///< does not cover +-90 degrees of base_link
     kGeometryChanged = 4,  ///< other angles, size or limits than the first accepted scan's
