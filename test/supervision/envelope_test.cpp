@@ -437,12 +437,13 @@ TEST(Envelope, StoppingDistanceIsReactionAndBraking) {
 }
 
 // The corridor of a truck that turns its hinge, as far as its front axle is driven 6 m ahead.
-Envelope::Result turning(double speed, double rate, double reaction_time) {
+Envelope::Result turning(double speed, double rate, double reaction_time, double deceleration = 1.0) {
   Check check;
   check.speed = speed;
   check.commanded = 0.6;
   check.parameters.envelope.horizon = 6.0;
   check.parameters.envelope.reaction_time = reaction_time;
+  check.parameters.envelope.deceleration = deceleration;
   check.parameters.limiter.max_articulation_rate = rate;
   check.envelope = Envelope(check.parameters.envelope, check.parameters.limiter, check.truck);
   return check.of(Scene());
@@ -459,6 +460,10 @@ void expectSameCorridor(const Envelope::Result& a, const Envelope::Result& b) {
 TEST(Envelope, ATruckThatStandsTurnsItsHingeAsAtHalfAMetrePerSecond) {
   // At 1 m/s without braking, twice the rate is the same turn on the same way.
   expectSameCorridor(turning(0.0, 0.2, 1.0), turning(1.0, 0.4, 10.0));
+}
+
+TEST(Envelope, ATruckThatDoesEverythingTwiceAsFastSweepsTheSameWay) {
+  expectSameCorridor(turning(3.0, 0.2, 1.0, 0.5), turning(6.0, 0.4, 0.5, 2.0));
 }
 
 // A standing truck with this hinge, driven 6 m ahead: where its corridor ends.
