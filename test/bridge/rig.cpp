@@ -108,7 +108,7 @@ void Rig::step() {
   }
   if (now >= next_tick_) {
     next_tick_ = now + fromSeconds(tick_period);
-    bridge->tick(now);
+    bridge->tick(clock());
     pump();
   }
 }
@@ -155,8 +155,8 @@ void Rig::pump() {
 void Rig::sendCommand() {
   supervision::Command sent = command;
   sent.sequence = command.sequence + sequence_++;
-  sent.stamp = measurement.value_or(now - measurement_age);
-  bridge->setCommand(sent, now);
+  sent.stamp = measurement.value_or(clock() - measurement_age);
+  bridge->setCommand(sent, clock());
   last_command = now;
 }
 
@@ -165,6 +165,22 @@ void Rig::drive(double speed) {
   run(1.5);
   bridge->engage(now);
   run(20.0, [&] { return state() == SafetyState::kActive && plant.state().speed > 0.97 * speed; });
+}
+
+void Rig::jump(Stamp by) {
+  jumped_ += by;
+  bridge->clockJumped(clock());
+  pump();
+}
+
+void Rig::runToSet() {
+  const std::size_t before = judge.commands.size();
+  run(0.05, [&] { return judge.commands.size() > before; });
+}
+
+void Rig::runToTick() {
+  const Stamp before = bridge->status().stamp;
+  run(0.05, [&] { return bridge->status().stamp != before; });
 }
 
 double Rig::timeToStop(double seconds) {

@@ -63,6 +63,16 @@ class Rig {
   SafetyState state() const { return bridge->status().state; }
   supervision::Reason reason() const { return bridge->status().reason; }
 
+  /// The bridge's clock, and the arbiter's: `now`, until it jumps.
+  Stamp clock() const { return now + jumped_; }
+
+  /// Lets that clock jump and tells the bridge; what it sends is carried.
+  void jump(Stamp by);
+
+  /// Runs until the bridge has just sent a set of frames, or just had a tick; at most 50 ms.
+  void runToSet();
+  void runToTick();
+
   /// Runs until the state is STOPPING, at most `seconds`; returns how long it took [s].
   double timeToStop(double seconds = 3.0);
 
@@ -103,6 +113,7 @@ class Rig {
   void moveTruck();
 
   Stamp next_tick_, next_command_;
+  Stamp jumped_{};
   std::uint32_t sequence_ = 0;
 };
 

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "tunnel_pilot/can/bus.h"
+
+namespace tunnel_pilot::bridge {
+
+/// A wire that may keep back the proof that frames were sent, and counts how often it is asked to
+/// discard them.
+class HoldingBus : public can::Bus {
+ public:
+  explicit HoldingBus(can::Bus& wire) : wire_(wire) {}
+
+  void hold() { holds_ = true; }
+  void prove() {
+    holds_ = false;
+    in_flight_ = 0;
+  }
+  int discards() const { return discards_; }
+
+  bool send(const can::Frame& frame) override {
+    const bool taken = wire_.send(frame);
+    if (taken && holds_) ++in_flight_;
+    return taken;
+  }
+  std::optional<can::Frame> receive() override { return wire_.receive(); }
+  std::uint64_t confirmed() const override { return wire_.confirmed() - in_flight_; }
+  std::uint64_t inFlight() const override { return in_flight_; }
+  void discard() override { ++discards_; }
+  can::BusState state() const override { return wire_.state(); }
+  int descriptor() const override { return -1; }
+
+ private:
+  can::Bus& wire_;
+  bool holds_ = false;
+  std::uint64_t in_flight_ = 0;
+  int discards_ = 0;
+};
+
+}  // namespace tunnel_pilot::bridge
