@@ -128,21 +128,6 @@ TEST_F(CanBridgeTest, BeforeAnyCommandItTellsItsOwnReason) {
   EXPECT_LT(rig.bridge->status().command_age, 0.03);
 }
 
-TEST_F(CanBridgeTest, ItsStatusTellsOfTheCabsWheelAndPedals) {
-  rig.cab.steering_wheel = 1.0;
-  rig.cab.throttle = 0.25;
-  rig.cab.brake = 0.5;
-  rig.run(0.5);
-  EXPECT_NEAR(rig.bridge->status().steering_wheel, 1.0, 0.001);
-  EXPECT_EQ(rig.bridge->status().throttle_pedal, 0.25);
-  EXPECT_EQ(rig.bridge->status().brake_pedal, 0.5);
-}
-
-TEST_F(CanBridgeTest, CountsTheChangesOfItsState) {
-  rig.drive();
-  EXPECT_EQ(rig.bridge->status().transitions, 3u) << "to STANDBY, ARMED and ACTIVE";
-}
-
 TEST_F(CanBridgeTest, RepeatsTheLastCommandEveryTwentyMilliseconds) {
   rig.drive();
   const std::size_t before = rig.judge.times.size();
