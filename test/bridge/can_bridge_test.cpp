@@ -2,11 +2,15 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
+#include <memory>
 #include <random>
+#include <string>
 
 #include "rig.h"
 
-// The way up and down, commands, frames. What the watchdogs find: can_bridge_watch_test.cpp.
+// The way up and down, commands, frames. What the watchdogs find: can_bridge_watch_test.cpp; its status:
+// can_bridge_status_test.cpp.
 namespace tunnel_pilot::bridge {
 namespace {
 
@@ -23,6 +27,24 @@ class CanBridgeTest : public testing::Test {
   }
   Rig rig;
 };
+
+/// In this state, on the usual way to it.
+std::unique_ptr<Rig> rigIn(SafetyState wanted) {
+  auto rig = std::make_unique<Rig>();
+  rig->run(wanted == SafetyState::kInit ? 0.5 : 1.5);
+  if (wanted == SafetyState::kArmed) rig->bridge->engage(rig->now), rig->run(0.03);
+  if (wanted >= SafetyState::kActive) rig->drive();
+  if (wanted == SafetyState::kDegraded) rig->measurement_age = ms(170), rig->run(0.1);
+  if (wanted >= SafetyState::kStopping) rig->bridge->stop(rig->now), rig->run(0.1);
+  if (wanted == SafetyState::kStopped) rig->run(10.0, [&] { return rig->state() == wanted; });
+  EXPECT_EQ(rig->state(), wanted);
+  return rig;
+}
+
+void expectRefusal(const CanBridge::Answer& answer, const std::string& why) {
+  EXPECT_FALSE(answer.accepted) << why;
+  EXPECT_EQ(answer.reason, why);
+}
 
 TEST_F(CanBridgeTest, LeavesInitOnlyAfterOneSecondOfHealth) {
   rig.run(0.98);
@@ -42,20 +64,20 @@ TEST_F(CanBridgeTest, RefusesToEngageBeforeOneSecondOfHealthAndSaysWhy) {
   rig.run(1.2);
   rig.arbiter_alive = false;
   rig.run(0.2);
-  EXPECT_EQ(rig.bridge->engage(rig.now).reason, "command stale");
+  expectRefusal(rig.bridge->engage(rig.now), "command stale");
   rig.arbiter_alive = true;
   rig.run(0.9);
-  EXPECT_EQ(rig.bridge->engage(rig.now).reason, "inputs not healthy for long enough");
+  expectRefusal(rig.bridge->engage(rig.now), "inputs not healthy for long enough");
   rig.run(0.2);
   EXPECT_TRUE(rig.bridge->engage(rig.now).accepted);
-  EXPECT_EQ(rig.bridge->engage(rig.now).reason, "already engaged");
+  expectRefusal(rig.bridge->engage(rig.now), "already engaged");
 }
 
 TEST_F(CanBridgeTest, RefusesToEngageWhileTheArbiterSeesNoTunnel) {
   rig.command.stop = true;
   rig.command.reason = Reason::kTunnelInvalid;
   rig.run(2.0);
-  EXPECT_EQ(rig.bridge->engage(rig.now).reason, "no valid tunnel");
+  expectRefusal(rig.bridge->engage(rig.now), "no valid tunnel");
 }
 
 TEST_F(CanBridgeTest, RefusesToEngageBeforeAWallOrAnObstacle) {
@@ -63,14 +85,61 @@ TEST_F(CanBridgeTest, RefusesToEngageBeforeAWallOrAnObstacle) {
   for (const Reason reason : {Reason::kClearance, Reason::kObstacle}) {
     rig.command.reason = reason;
     rig.run(2.0);
-    EXPECT_EQ(rig.bridge->engage(rig.now).reason, supervision::toString(reason));
+    expectRefusal(rig.bridge->engage(rig.now), supervision::toString(reason));
   }
 }
 
 TEST_F(CanBridgeTest, RefusesToEngageWithoutABus) {
   rig.run(1.5);
   rig.bridge_side.setState(can::BusState::kBusOff);
-  EXPECT_EQ(rig.bridge->engage(rig.now).reason, "bus fault");
+  expectRefusal(rig.bridge->engage(rig.now), "bus fault");
+}
+
+TEST(CanBridgeAnswers, EngageIsRefusedInEveryStateButStandby) {
+  const std::string stopped = "stopped: stopped by the operator; reset first";
+  for (const auto& [state, why] : std::map<SafetyState, std::string>{
+           {SafetyState::kInit, "starting up: inputs not healthy for long enough"},
+           {SafetyState::kArmed, "already engaged"},
+           {SafetyState::kActive, "already engaged"},
+           {SafetyState::kDegraded, "already engaged"},
+           {SafetyState::kStopping, stopped},
+           {SafetyState::kStopped, stopped}}) {
+    const auto rig = rigIn(state);
+    expectRefusal(rig->bridge->engage(rig->now), why);
+    EXPECT_EQ(rig->state(), state);
+  }
+}
+
+TEST(CanBridgeAnswers, ResetIsRefusedInEveryStateButStopped) {
+  for (const auto& [state, why] :
+       std::map<SafetyState, std::string>{{SafetyState::kInit, "not stopped"},
+                                          {SafetyState::kStandby, "not stopped"},
+                                          {SafetyState::kArmed, "not stopped"},
+                                          {SafetyState::kActive, "not stopped"},
+                                          {SafetyState::kDegraded, "not stopped"},
+                                          {SafetyState::kStopping, "still stopping"}}) {
+    const auto rig = rigIn(state);
+    rig->run(0.05);
+    expectRefusal(rig->bridge->reset(rig->now), why);
+    EXPECT_EQ(rig->state(), state);
+  }
+}
+
+TEST(CanBridgeAnswers, ReleaseIsRefusedWhereNobodyIsEngaged) {
+  for (const SafetyState state :
+       {SafetyState::kInit, SafetyState::kStandby, SafetyState::kStopping, SafetyState::kStopped}) {
+    const auto rig = rigIn(state);
+    expectRefusal(rig->bridge->release(rig->now), "not engaged");
+  }
+}
+
+TEST(CanBridgeAnswers, AStopIsAcceptedInEveryState) {
+  for (const SafetyState state :
+       {SafetyState::kInit, SafetyState::kStandby, SafetyState::kArmed, SafetyState::kActive,
+        SafetyState::kDegraded, SafetyState::kStopping, SafetyState::kStopped}) {
+    const auto rig = rigIn(state);
+    EXPECT_TRUE(rig->bridge->stop(rig->now).accepted) << toString(state);
+  }
 }
 
 TEST_F(CanBridgeTest, FirstFramesAfterEngagingAreNotIntendedToSteer) {
@@ -178,6 +247,60 @@ TEST_F(CanBridgeTest, StartsToSteerFromTheMeasuredAngle) {
   EXPECT_NEAR(rig.judge.last->articulation_angle, 20.0 * kDeg, 0.32 * kDeg);
 }
 
+// A hinge that is turned by hand, 1 deg in each frame of the truck.
+TEST_F(CanBridgeTest, StartsToSteerFromTheAngleMeasuredLast) {
+  rig.run(1.5);
+  ASSERT_TRUE(rig.bridge->engage(rig.now).accepted);
+  double told = 0.0;
+  rig.to_bridge = [&, start = rig.now](const can::Frame& frame) {
+    auto feedback = can::decode<can::TruckFeedbackFrame>(frame);
+    if (!feedback) return std::optional<can::Frame>(frame);
+    told = feedback->articulation_angle = 50.0 * kDeg * toSeconds(rig.now - start);
+    return can::encode(*feedback);
+  };
+  rig.run(1.0, [&] { return rig.judge.last->steering_enable; });
+  ASSERT_GT(told, 4.0 * kDeg);
+  EXPECT_NEAR(rig.judge.last->articulation_angle, told, 0.32 * kDeg);
+}
+
+TEST_F(CanBridgeTest, WhileItDoesNotSteerItTellsTheMeasuredAngle) {
+  rig.plant.reset(geometry::Pose(), 5.0 * kDeg, 0.0);
+  rig.command.articulation_angle = 20.0 * kDeg;
+  rig.run(1.5);
+  EXPECT_NEAR(rig.judge.last->articulation_angle, 5.0 * kDeg, 0.01 * kDeg);
+}
+
+TEST_F(CanBridgeTest, SendsASlowCommandAsItIs) {
+  rig.command.acceleration = 0.4;
+  rig.drive(0.5);
+  EXPECT_NEAR(rig.judge.last->speed, 0.5, 0.001);
+  EXPECT_NEAR(rig.judge.last->acceleration, 0.4, 0.001);
+}
+
+TEST_F(CanBridgeTest, WhileDrivingTheFrameTellsTheCommandsReason) {
+  rig.drive();
+  rig.command.reason = Reason::kObstacle;
+  rig.run(0.1);
+  ASSERT_EQ(rig.reason(), Reason::kNone) << "no reason to change the state";
+  EXPECT_EQ(rig.judge.last->reason, static_cast<int>(Reason::kObstacle));
+}
+
+TEST_F(CanBridgeTest, TellsTheCommandsSource) {
+  rig.drive();
+  EXPECT_EQ(rig.judge.last_info->source, static_cast<int>(supervision::Source::kPreviewDriver));
+}
+
+TEST_F(CanBridgeTest, AHoldTellsTheStampOfTheTrucksFrame) {
+  rig.drive(5.0);
+  rig.arbiter_alive = false;
+  rig.timeToStop();
+  rig.run(0.5);
+  ASSERT_EQ(rig.judge.last_info->source, static_cast<int>(supervision::Source::kHold));
+  const auto now = std::chrono::duration_cast<std::chrono::milliseconds>(rig.now).count();
+  const auto age = static_cast<std::uint16_t>(now - rig.judge.last_info->measurement_stamp_ms);
+  EXPECT_LE(age, 46) << "20 ms old, read 5 ms later, repeated 20 ms later";
+}
+
 TEST(CanBridgeRate, NeverSendsMoreThanSixteenFramesInAQuarterSecond) {
   Rig rig(0.001);
   rig.run(1.5);
@@ -241,6 +364,8 @@ INSTANTIATE_TEST_SUITE_P(
                     [](Command& c, Stamp) { c.speed = -0.1; }, [](Command& c, Stamp) { c.speed = 9.8; },
                     [](Command& c, Stamp) { c.acceleration = -0.1; },
                     [](Command& c, Stamp) { c.acceleration = 3.1; },
+                    [](Command& c, Stamp) { c.speed = -1.05e-6; },
+                    [](Command& c, Stamp) { c.speed = Rig::bridgeParameters().max_speed + 1.05e-6; },
                     [](Command& c, Stamp now) { c.stamp = now + ms(51); },
                     [](Command& c, Stamp) { c.sequence = 0; }));
 
@@ -259,6 +384,46 @@ TEST_F(CanBridgeTest, TakesCommandsAtTheLimits) {
   }
 }
 
+TEST_F(CanBridgeTest, TakesCommandsBeyondTheLimitsByRounding) {
+  Command command = rig.command;
+  command.stamp = rig.now;
+  command.speed = -1e-6;
+  command.acceleration = Rig::bridgeParameters().max_acceleration + 1e-6;
+  rig.bridge->setCommand(command, rig.now);
+  EXPECT_EQ(rig.bridge->status().command_rejection, "");
+}
+
+TEST_F(CanBridgeTest, TakesAStampAsFarAheadAsIsTolerated) {
+  Command command = rig.command;
+  command.stamp = rig.now + ms(50);
+  rig.bridge->setCommand(command, rig.now);
+  EXPECT_EQ(rig.bridge->status().command_rejection, "");
+}
+
+TEST_F(CanBridgeTest, RefusesAnAngleThatNoFrameTellsThoughTheTruckTurnsSoFar) {
+  vehicle::TruckGeometry wide = Rig::truckParameters().geometry;
+  wide.max_articulation = 50.0 * kDeg;
+  CanBridge bridge(Rig::bridgeParameters(), wide, *rig.bridge_end);
+  Command command = rig.command;
+  command.stamp = rig.now;
+  command.articulation_angle = 45.0 * kDeg;
+  bridge.setCommand(command, rig.now);
+  EXPECT_EQ(bridge.status().command_rejection, "");
+  command.articulation_angle = 45.1 * kDeg;
+  bridge.setCommand(command, rig.now);
+  EXPECT_EQ(bridge.status().command_rejection, "articulation angle out of range");
+}
+
+TEST_F(CanBridgeTest, ARefusedCommandsStopIsOnTheBusWithinTheCall) {
+  rig.drive();
+  Command bad = rig.command;
+  bad.stop = true;
+  bad.speed = -1.0;
+  rig.bridge->setCommand(bad, rig.now);
+  rig.pump();
+  EXPECT_TRUE(rig.judge.last->stop);
+}
+
 TEST_F(CanBridgeTest, TakesACommandThatComesTwiceWhileDriving) {
   rig.drive();
   Command command = rig.command;
@@ -267,6 +432,44 @@ TEST_F(CanBridgeTest, TakesACommandThatComesTwiceWhileDriving) {
   rig.bridge->setCommand(command, rig.now);
   rig.bridge->setCommand(command, rig.now);
   EXPECT_EQ(rig.bridge->status().commands_rejected, 0u);
+}
+
+TEST_F(CanBridgeTest, ACommandThatComesTwiceIsToldByItsNumber) {
+  rig.drive();
+  rig.arbiter_alive = false;
+  Command command = rig.command;
+  command.sequence = 1u << 20;
+  command.stamp = rig.now;
+  rig.bridge->setCommand(command, rig.now);
+  rig.bridge->setCommand(command, rig.now);
+  rig.runToSet();
+  EXPECT_EQ(rig.judge.last_info->sequence, 1u << 20);
+}
+
+TEST_F(CanBridgeTest, AnArbiterThatStartedAgainCountsOnFromTheNumberToldLast) {
+  rig.run(1.5);
+  rig.arbiter_alive = false;
+  rig.runToSet();
+  const std::uint32_t before = rig.judge.last_info->sequence;
+  Command command = rig.command;
+  command.stamp = rig.now;
+  for (const std::uint32_t number : {7, 8}) {  // its first were not heard
+    command.sequence = number;
+    rig.bridge->setCommand(command, rig.now);
+    rig.runToSet();
+    EXPECT_EQ(rig.judge.last_info->sequence, before + number - 6);
+  }
+}
+
+TEST_F(CanBridgeTest, AnArbiterThatStartedAgainMayNotCountBackwardsWhileDriving) {
+  rig.command.sequence = 1000;
+  rig.run(1.5);
+  rig.command.sequence = 0;  // starts again
+  rig.drive();
+  Command command = rig.command;
+  command.stamp = rig.now;
+  rig.bridge->setCommand(command, rig.now);
+  EXPECT_EQ(rig.bridge->status().command_rejection, "sequence decreases");
 }
 
 TEST_F(CanBridgeTest, TakesAnArbiterThatStartedAgainOnlyWhenNotDriving) {
@@ -300,18 +503,12 @@ TEST_F(CanBridgeTest, AnArbiterThatStartsAgainWhileTheTruckStopsIsRefused) {
 TEST_F(CanBridgeTest, OperatorsStopIsOnTheBusWithinTheCallInEveryState) {
   for (const SafetyState wanted : {SafetyState::kInit, SafetyState::kStandby, SafetyState::kArmed,
                                    SafetyState::kActive, SafetyState::kDegraded}) {
-    Rig other;
-    if (wanted == SafetyState::kInit) other.run(0.5);
-    if (wanted == SafetyState::kStandby) other.run(1.5);
-    if (wanted == SafetyState::kArmed) other.run(1.5), other.bridge->engage(other.now), other.run(0.03);
-    if (wanted >= SafetyState::kActive) other.drive();
-    if (wanted == SafetyState::kDegraded) other.measurement_age = ms(170), other.run(0.1);
-    ASSERT_EQ(other.state(), wanted);
-    other.bridge->stop(other.now);
-    const auto frame = other.wire_to_bridge->receive();  // before any tick
+    const auto other = rigIn(wanted);
+    other->bridge->stop(other->now);
+    const auto frame = other->wire_to_bridge->receive();  // before any tick
     ASSERT_TRUE(frame) << toString(wanted);
     EXPECT_TRUE(can::decode<can::TruckCommandFrame>(*frame)->stop);
-    EXPECT_TRUE(isStop(other.state()));
+    EXPECT_TRUE(isStop(other->state()));
   }
 }
 
@@ -359,6 +556,60 @@ TEST_F(CanBridgeTest, StopWithoutFreshCommandsHoldsTheMeasuredArticulation) {
   EXPECT_TRUE(rig.judge.last->steering_enable);
 }
 
+TEST_F(CanBridgeTest, AStopSteersAlongCommandsThatAreFreshAgain) {
+  rig.drive(5.0);
+  rig.arbiter_alive = false;
+  rig.timeToStop();
+  rig.run(0.1);
+  rig.arbiter_alive = true;
+  rig.command.articulation_angle = 8.0 * kDeg;
+  rig.run(1.0);
+  ASSERT_EQ(rig.state(), SafetyState::kStopping);
+  EXPECT_NEAR(rig.judge.last->articulation_angle, 8.0 * kDeg, 0.01 * kDeg);
+}
+
+// The last set before it drives stems from a measurement that is too old once it is on the bus; the next
+// one is fresh just until ACTIVE, and has become too old when the next set is due. The hinge was turned
+// in between.
+TEST(CanBridgeHold, IsOfTheAngleMeasuredThenNotOfOneBeforeItDrove) {
+  Rig rig(0.001);
+  double told = 2.0 * kDeg;
+  rig.to_bridge = [&](const can::Frame& frame) {
+    auto feedback = can::decode<can::TruckFeedbackFrame>(frame);
+    if (!feedback) return std::optional<can::Frame>(frame);
+    feedback->articulation_angle = told;
+    feedback->speed = 1.0;  // so that the stop lasts
+    return can::encode(*feedback);
+  };
+  rig.run(0.01);
+  rig.jump(Stamp{});  // its sets are sent midway between the truck's frames
+  rig.run(1.5);
+  rig.arbiter_alive = false;
+  Command said = rig.command;
+  said.sequence = 1u << 20;
+  const auto measured = [&](Stamp stamp) {
+    said.stamp = stamp;
+    rig.bridge->setCommand(said, rig.now);
+  };
+  rig.runToSet();
+  rig.run(0.005);
+  measured(rig.now - ms(60));
+  ASSERT_TRUE(rig.bridge->engage(rig.now).accepted);
+  rig.run(0.09);
+  measured(rig.now + ms(5) - ms(299));
+  rig.runToSet();
+  ASSERT_EQ(rig.state(), SafetyState::kArmed);
+  told = 10.0 * kDeg;
+  measured(rig.now + ms(18) - ms(300));
+  rig.run(0.005);
+  ASSERT_TRUE(rig.state() == SafetyState::kActive || rig.state() == SafetyState::kDegraded);
+  rig.runToSet();
+  ASSERT_EQ(rig.state(), SafetyState::kStopping);
+  rig.run(0.2);
+  ASSERT_TRUE(rig.judge.last->steering_enable);
+  EXPECT_NEAR(rig.judge.last->articulation_angle, 10.0 * kDeg, 0.01 * kDeg);
+}
+
 TEST_F(CanBridgeTest, StoppedIsLatchedUntilAnOperatorsReset) {
   rig.drive();
   rig.bridge->stop(rig.now);
@@ -381,12 +632,12 @@ TEST_F(CanBridgeTest, ResetIsRefusedWhileStoppingAndUntilAllIsHealthyForOneSecon
   rig.drive();
   rig.arbiter_alive = false;
   rig.timeToStop();
-  EXPECT_EQ(rig.bridge->reset(rig.now).reason, "still stopping");
+  expectRefusal(rig.bridge->reset(rig.now), "still stopping");
   rig.run(10.0, [&] { return rig.state() == SafetyState::kStopped; });
-  EXPECT_EQ(rig.bridge->reset(rig.now).reason, "command stale");
+  expectRefusal(rig.bridge->reset(rig.now), "command stale");
   rig.arbiter_alive = true;
   rig.run(0.9);
-  EXPECT_EQ(rig.bridge->reset(rig.now).reason, "inputs not healthy for long enough");
+  expectRefusal(rig.bridge->reset(rig.now), "inputs not healthy for long enough");
   rig.run(0.2);
   EXPECT_TRUE(rig.bridge->reset(rig.now).accepted);
 }
@@ -398,7 +649,7 @@ TEST_F(CanBridgeTest, ResetIsRefusedWhileTheTruckMoves) {
   rig.run(1.0);
   rig.plant.reset(geometry::Pose(), 0.0, 1.0);  // pushed
   rig.run(0.05);
-  EXPECT_EQ(rig.bridge->reset(rig.now).reason, "the truck moves");
+  expectRefusal(rig.bridge->reset(rig.now), "the truck moves");
   rig.run(5.0);
   EXPECT_TRUE(rig.bridge->reset(rig.now).accepted);
 }
