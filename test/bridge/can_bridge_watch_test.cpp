@@ -66,6 +66,25 @@ TEST_P(Watchdog, CommandTooWideForTheSpeedIsHeldToTheLateralAcceleration) {
   EXPECT_EQ(rig.state(), SafetyState::kActive);
 }
 
+TEST_P(Watchdog, TheHigherOfTheTrucksTwoSpeedsLimitsTheAngle) {
+  for (const bool front : {true, false}) {
+    Rig other(GetParam());
+    other.drive(3.0);
+    other.to_bridge = [front](const can::Frame& f) {
+      auto feedback = can::decode<can::TruckFeedbackFrame>(f);
+      auto motion = can::decode<can::TruckMotionFrame>(f);
+      if (feedback && !front) feedback->speed = 6.0;
+      if (motion && front) motion->front_axle_speed = 6.0;
+      return feedback ? can::encode(*feedback) : motion ? can::encode(*motion) : f;
+    };
+    other.command.articulation_angle = 40.0 * kDeg;
+    other.run(2.5, [&] { return other.judge.last->articulation_angle > 20.0 * kDeg; });
+    const double widest =
+        vehicle::steadyArticulation(Rig::truckParameters().geometry, 2.0 / (6.0 * 6.0));
+    EXPECT_NEAR(other.judge.last->articulation_angle, widest, 0.01 * kDeg) << front;
+  }
+}
+
 TEST_P(Watchdog, CommandStale) {
   rig.drive();
   rig.run(0.02, [&] { return rig.bridge->status().command_age < 0.001; });
@@ -380,6 +399,33 @@ TEST(WatchdogLatency, NothingDrivesOnWhatIsTooOldOnceItIsOnTheBus) {
   }
 }
 
+TEST(WatchdogLatency, AStopSteersOnNothingThatIsTooOldOnceItIsOnTheBus) {
+  for (int phase = 0; phase < 20; ++phase) {
+    const auto rig = drivingRig(0.005, phase);
+    rig->bridge->stop(rig->now);
+    rig->truck_alive = false;
+    rig->run(0.1);
+    ASSERT_EQ(rig->state(), SafetyState::kStopping);
+    std::size_t i = rig->judge.commands.size() - 1;
+    while (!rig->judge.commands[i].steering_enable) --i;
+    EXPECT_LE(rig->judge.times[i] + kLeaving - rig->last_feedback, ms(60)) << phase;
+  }
+}
+
+TEST(WatchdogLatency, WhatIsJustFreshOnceItIsOnTheBusStillDrives) {
+  Rig rig(0.001);
+  rig.drive();
+  rig.runToSet();
+  rig.arbiter_alive = false;
+  supervision::Command said = rig.command;
+  said.sequence = 1u << 20;
+  said.stamp = rig.now + ms(20) + kLeaving - ms(300);
+  rig.bridge->setCommand(said, rig.now);
+  const std::size_t before = rig.judge.commands.size();
+  rig.run(0.020);
+  EXPECT_EQ(rig.judge.commands.size(), before + 1);
+}
+
 TEST(WatchdogLatency, FramesOfTheTruckThatComeAtTheLimitLetItDriveOnWithoutABreak) {
   const auto rig = drivingRig(0.020, 0);
   std::vector<can::Frame> late;
@@ -399,6 +445,92 @@ TEST(WatchdogLatency, FramesOfTheTruckThatComeAtTheLimitLetItDriveOnWithoutABrea
   for (std::size_t i = before; i < rig->judge.commands.size(); ++i)
     EXPECT_TRUE(rig->judge.commands[i].steering_enable);
   EXPECT_TRUE(rig->judge.complaints.empty());
+}
+
+// -------- at a limit, to the nanosecond
+
+class AtTheLimit : public testing::Test {
+ protected:
+  /// Until so long after `from`.
+  void runUntil(Stamp from, double seconds) {
+    rig.run(toSeconds(from + fromSeconds(seconds) - rig.now));
+  }
+  Rig rig{0.001};
+};
+
+TEST_F(AtTheLimit, ACommandIsFresh) {
+  rig.measurement_age = ms(10);
+  rig.drive();
+  rig.arbiter_alive = false;
+  runUntil(rig.last_command, 0.1);
+  EXPECT_EQ(rig.state(), SafetyState::kActive);
+  rig.run(0.001);
+  EXPECT_EQ(rig.state(), SafetyState::kStopping);
+}
+
+TEST_F(AtTheLimit, AMeasurementIsNotLate) {
+  rig.drive();
+  rig.measurement = rig.now;
+  runUntil(*rig.measurement, 0.15);
+  EXPECT_EQ(rig.state(), SafetyState::kActive);
+  rig.run(0.001);
+  EXPECT_EQ(rig.state(), SafetyState::kDegraded);
+}
+
+TEST_F(AtTheLimit, AMeasurementIsFresh) {
+  rig.drive();
+  rig.measurement = rig.now;
+  runUntil(*rig.measurement, 0.3);
+  EXPECT_EQ(rig.state(), SafetyState::kDegraded);
+  rig.run(0.001);
+  EXPECT_EQ(rig.state(), SafetyState::kStopping);
+}
+
+TEST_F(AtTheLimit, ATruckMayStillObey) {
+  rig.to_bridge = [](const can::Frame& f) {
+    auto feedback = can::decode<can::TruckFeedbackFrame>(f);
+    if (feedback) feedback->autonomy_enabled = false;
+    return feedback ? can::encode(*feedback) : f;
+  };
+  rig.run(1.5);
+  ASSERT_TRUE(rig.bridge->engage(rig.now).accepted);
+  rig.run(1.0, [&] { return rig.state() == SafetyState::kActive; });
+  rig.run(0.5);
+  EXPECT_EQ(rig.state(), SafetyState::kActive);
+  rig.run(0.001);
+  EXPECT_EQ(rig.state(), SafetyState::kStopping);
+}
+
+TEST_F(AtTheLimit, ArmingIsOver) {
+  rig.run(1.5);
+  ASSERT_TRUE(rig.bridge->engage(rig.now).accepted);
+  rig.run(0.099);
+  EXPECT_EQ(rig.state(), SafetyState::kArmed);
+  rig.run(0.001);
+  EXPECT_EQ(rig.state(), SafetyState::kActive);
+}
+
+TEST_F(AtTheLimit, ArmingInVainIsOver) {
+  rig.command.stop = true;
+  rig.command.reason = Reason::kNotEngaged;
+  rig.run(1.5);
+  ASSERT_TRUE(rig.bridge->engage(rig.now).accepted);
+  rig.run(1.999);
+  EXPECT_EQ(rig.state(), SafetyState::kArmed);
+  rig.run(0.001);
+  EXPECT_EQ(rig.state(), SafetyState::kStandby);
+}
+
+TEST_F(AtTheLimit, ATruckOfTheSpeedOfStandstillMoves) {
+  rig.to_bridge = [](const can::Frame& f) {
+    auto feedback = can::decode<can::TruckFeedbackFrame>(f);
+    if (feedback) feedback->speed = Rig::bridgeParameters().standstill_speed;
+    return feedback ? can::encode(*feedback) : f;
+  };
+  rig.run(1.5);
+  rig.bridge->stop(rig.now);
+  rig.run(1.0);
+  EXPECT_EQ(rig.state(), SafetyState::kStopping);
 }
 
 // -------- DEGRADED
