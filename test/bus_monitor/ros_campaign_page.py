@@ -16,6 +16,12 @@ Simulated time stands still until the bridge has said what is due. It says nothi
 on the bus ([can.md](can.md), "What the bridge sends"): the next tick has news, or stops. In the run of seed 24 all 30 waits were followed by a set in the next tick of
 10 ms; one was looked at closely, and the command was 100 ms old.
 
+## Runs
+
+Seeds 24, 25 and 26, with the same programs: 100,006, 100,001 and 100,002 injections, no unsafe frame. In the run of seed 26 the truck stood for half of the time: where it cannot
+go on from, the campaign moves it back without its wheels turning, and the walls that the arbiter remembers beside it came along
+("too little clearance to a wall").
+
 ## What runs found
 
 - `old measurement`, six frames of seed 23: a spoilt scan between two that are the same made the second one fresh, and one from the future was
