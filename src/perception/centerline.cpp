@@ -21,8 +21,12 @@ constexpr double kPathBehind = 1.5;      // [m] of the path's begin behind the r
 constexpr double kCurveStep = 0.5;       // [m] between samples of the walls' curves
 constexpr std::size_t kFewestInFit = 4;  // nodes in a parabola's window
 
-bool isFinite(const Pose& pose) {
-  return std::isfinite(pose.x) && std::isfinite(pose.y) && std::isfinite(pose.heading);
+// Farther from its origin, or turned more often, a pose resolves no nanometre any more, and at last
+// nothing. Written so that numbers that are none fail.
+bool isUsable(const Pose& pose) {
+  constexpr double kFarthest = 1e6;  // [m], [rad]
+  return std::abs(pose.x) <= kFarthest && std::abs(pose.y) <= kFarthest &&
+         std::abs(pose.heading) <= kFarthest;
 }
 
 // Unit tangent of a polyline at sample i, by central differences.
@@ -87,7 +91,7 @@ const Tunnel& CenterlineEstimator::refuse(TunnelReason reason) {
 
 const Tunnel& CenterlineEstimator::update(const Walls& walls, const std::optional<Pose>& odom_pose) {
   tunnel_.state.stamp = walls.stamp;
-  const std::optional<Pose> pose = odom_pose && isFinite(*odom_pose) ? odom_pose : std::nullopt;
+  const std::optional<Pose> pose = odom_pose && isUsable(*odom_pose) ? odom_pose : std::nullopt;
   TunnelReason reason = measure(walls, pose);
   travel(walls, pose);
   if (reason == TunnelReason::kNone && !paired_now_) reason = checkSingle(walls, pose.has_value());

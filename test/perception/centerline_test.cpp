@@ -174,12 +174,17 @@ TEST(Centerline, CurvesWithNanAreRefusedNotPassedOn) {
   EXPECT_TRUE(estimator.update(straightWalls({}, fromSeconds(1.1)), Pose{}).state.valid);
 }
 
-TEST(Centerline, OdometryThatIsNotFiniteCountsAsNone) {
-  CenterlineEstimator estimator(parameters());
-  const Pose bad{std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0};
-  const Tunnel& tunnel = estimator.update(straightWalls({0.0, 0.3, 0.1}, fromSeconds(1.0)), bad);
-  ASSERT_TRUE(tunnel.state.valid);
-  EXPECT_NEAR(tunnel.state.lateral_offset, 0.3, 1e-6);
+TEST(Centerline, OdometryThatIsNotFiniteOrOutOfAllBoundsCountsAsNone) {
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), -6e66, 1e300, 1.1e6}) {
+    for (double Pose::*field : {&Pose::x, &Pose::y, &Pose::heading}) {
+      CenterlineEstimator estimator(parameters());
+      Pose odom;
+      odom.*field = bad;
+      const Tunnel& tunnel = estimator.update(straightWalls({0.0, 0.3, 0.1}, fromSeconds(1.0)), odom);
+      ASSERT_TRUE(tunnel.state.valid) << bad;
+      EXPECT_NEAR(tunnel.state.lateral_offset, 0.3, 1e-9) << bad;
+    }
+  }
 }
 
 TEST(Centerline, AnOdometryJumpDoesNotBendTheCenterline) {

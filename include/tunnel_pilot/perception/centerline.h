@@ -54,8 +54,8 @@ class CenterlineEstimator {
   CenterlineEstimator& operator=(const CenterlineEstimator&) = delete;
 
   /// `odom_pose` is base_link in a smooth frame (dead reckoning) at the walls' stamp; nothing when there
-  /// is no odometry. A pose that is not finite counts as none. The result is this object's and stands
-  /// until the next call.
+  /// is no odometry. A pose that is not finite, or beyond 1e6 m or rad, counts as none. The result is
+  /// this object's and stands until the next call.
   const Tunnel& update(const Walls& walls, const std::optional<geometry::Pose>& odom_pose);
 
   /// Forgets everything measured (after a clock jump or when odometry starts anew).
