@@ -1,10 +1,6 @@
 #include <gtest/gtest.h>
 
-#include <memory>
-#include <string>
-
 #include "holding_bus.h"
-#include "rig.h"
 
 // What the bridge asks of a bus that does not work, and what of one that does not prove its frames.
 namespace tunnel_pilot::bridge {
@@ -12,21 +8,9 @@ namespace {
 
 using supervision::Command;
 
-class CanBridgeBus : public testing::Test {
+class CanBridgeBus : public HoldingBusTest {
  protected:
-  CanBridgeBus()
-      : rig(0.001, [this](can::Bus& wire) {
-          auto made = std::make_unique<HoldingBus>(wire);
-          bus = made.get();
-          return made;
-        }) {}
-  void TearDown() override {
-    for (const std::string& complaint : rig.judge.complaints)
-      ADD_FAILURE() << "unsafe frame: " << complaint;
-  }
-
-  HoldingBus* bus = nullptr;
-  Rig rig;
+  CanBridgeBus() : HoldingBusTest(0.001) {}
 };
 
 TEST_F(CanBridgeBus, ABusThatStaysOffIsAskedToDiscardOnceIn500Milliseconds) {

@@ -1,32 +1,16 @@
 #include <gtest/gtest.h>
 
-#include <memory>
-#include <string>
-
 #include "holding_bus.h"
-#include "rig.h"
 
 // What a clock that jumps makes void. That it stops, and how fast: can_bridge_watch_test.cpp.
 namespace tunnel_pilot::bridge {
 namespace {
 
 // The bridge's clock jumps, back or ahead, by this time [s].
-class ClockJump : public testing::TestWithParam<double> {
+class ClockJump : public HoldingBusTest, public testing::WithParamInterface<double> {
  protected:
-  ClockJump()
-      : rig(0.005, [this](can::Bus& wire) {
-          auto made = std::make_unique<HoldingBus>(wire);
-          bus = made.get();
-          return made;
-        }) {}
-  void TearDown() override {
-    for (const std::string& complaint : rig.judge.complaints)
-      ADD_FAILURE() << "unsafe frame: " << complaint;
-  }
+  ClockJump() : HoldingBusTest(0.005) {}
   void jump() { rig.jump(fromSeconds(GetParam())); }
-
-  HoldingBus* bus = nullptr;
-  Rig rig;
 };
 INSTANTIATE_TEST_SUITE_P(BackAndAhead, ClockJump, testing::Values(-5.0, 100.0));
 

@@ -1,8 +1,13 @@
 #pragma once
 
-#include <cstdint>
-#include <optional>
+#include <gtest/gtest.h>
 
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "rig.h"
 #include "tunnel_pilot/can/bus.h"
 
 namespace tunnel_pilot::bridge {
@@ -37,6 +42,25 @@ class HoldingBus : public can::Bus {
   bool holds_ = false;
   std::uint64_t in_flight_ = 0;
   int discards_ = 0;
+};
+
+/// A rig whose bridge has such a wire; at the end no frame was unsafe.
+class HoldingBusTest : public testing::Test {
+ protected:
+  /// `tick` [s]: how often the bridge is called
+  explicit HoldingBusTest(double tick)
+      : rig(tick, [this](can::Bus& wire) {
+          auto made = std::make_unique<HoldingBus>(wire);
+          bus = made.get();
+          return made;
+        }) {}
+  void TearDown() override {
+    for (const std::string& complaint : rig.judge.complaints)
+      ADD_FAILURE() << "unsafe frame: " << complaint;
+  }
+
+  HoldingBus* bus = nullptr;
+  Rig rig;
 };
 
 }  // namespace tunnel_pilot::bridge
