@@ -75,8 +75,8 @@ ros::Time toRos(Stamp stamp) {
 Stamp now() { return toCore(ros::Time::now()); }
 
 Stamp nowAfter(const ros::Time& stamp) {
-  constexpr double kOvertaken = 0.05;  // [s] farther ahead it is not the clock that is late
-  if (!ros::Time::isSimTime() || (stamp - ros::Time::now()).toSec() > kOvertaken) return now();
+  constexpr Stamp kOvertaken = std::chrono::milliseconds(50);  // beyond, not the clock is late
+  if (!ros::Time::isSimTime() || toCore(stamp) > now() + kOvertaken) return now();
   const ros::SteadyTime end = ros::SteadyTime::now() + ros::WallDuration(0.05);
   while (ros::Time::now() < stamp && ros::SteadyTime::now() < end) ros::WallDuration(0.0002).sleep();
   return now();

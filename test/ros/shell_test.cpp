@@ -77,6 +77,18 @@ TEST(Stamps, PassToTheNanosecond) {
   EXPECT_EQ(1700000000123456789LL, toCore(time).count());
 }
 
+// ros::Time subtracts to 68 years at most, and throws beyond.
+TEST(Stamps, AMessageStampedHoweverFarAheadIsNotWaitedFor) {
+  ros::Time::init();
+  ros::Time::setNow(ros::Time(1000, 0));
+  const ros::SteadyTime before = ros::SteadyTime::now();
+  for (const std::uint32_t second : {1001U, 2000000000U, 4294967295U}) {
+    EXPECT_EQ(nowAfter(ros::Time(second, 0)), std::chrono::seconds(1000)) << second;
+  }
+  EXPECT_LT((ros::SteadyTime::now() - before).toSec(), 0.05);
+  ros::Time::init();  // no simulated time for the tests that follow
+}
+
 TEST(Conversions, ScanComesBackUnchanged) {
   sensor_msgs::LaserScan message;
   message.header.stamp = ros::Time(5, 7);
