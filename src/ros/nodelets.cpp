@@ -11,13 +11,16 @@
 
 namespace tunnel_pilot::shell {
 
-using ScanFilterNodelet = StageNodelet<ScanFilterRos>;
-using WallSegmentationNodelet = StageNodelet<WallSegmentationRos>;
-using CenterlineNodelet = StageNodelet<CenterlineRos>;
-using LidarDriverNodelet = StageNodelet<LidarDriverRos>;
-using PreviewDriverNodelet = StageNodelet<PreviewDriverRos>;
-using ArbiterNodelet = StageNodelet<ArbiterRos>;
-using MarkersNodelet = StageNodelet<MarkersRos>;
+// Decisions before all else. The network, which needs the points alone, before the tunnel, which takes
+// three times as long; then whoever is nearer to the command, so that a scan is through before the next.
+// Pictures need not come at once.
+using ArbiterNodelet = StageNodelet<ArbiterRos, 0>;
+using LidarDriverNodelet = StageNodelet<LidarDriverRos, 1>;
+using PreviewDriverNodelet = StageNodelet<PreviewDriverRos, 2>;
+using CenterlineNodelet = StageNodelet<CenterlineRos, 3>;
+using WallSegmentationNodelet = StageNodelet<WallSegmentationRos, 4>;
+using ScanFilterNodelet = StageNodelet<ScanFilterRos, 5>;
+using MarkersNodelet = StageNodelet<MarkersRos, 6>;
 
 }  // namespace tunnel_pilot::shell
 

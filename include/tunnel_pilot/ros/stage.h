@@ -7,25 +7,41 @@
 #include <memory>
 #include <string>
 
+#include "tunnel_pilot/ros/executor.h"
 #include "tunnel_pilot/ros/heartbeat.h"
 
 namespace tunnel_pilot::shell {
 
-/// A stage as nodelet: its callbacks run one at a time (single-threaded queue of the manager), its
-/// heartbeat among them. A stage
+/// A stage as nodelet: its callbacks run one at a time, its heartbeat among them, in one thread with
+/// those of the other stages of its namespace in this manager; of lower `rank` first (Executor). A stage
 /// that refuses its parameters is not loaded; the log says why.
-template <class Stage>
+template <class Stage, int rank>
 class StageNodelet : public nodelet::Nodelet {
+ public:
+  ~StageNodelet() override {
+    if (queue_) queue_->stop();  // before the stage ends, member by member
+  }
+
+ private:
   void onInit() override {
+    ros::NodeHandle nh = getNodeHandle();
+    ros::NodeHandle private_nh = getPrivateNodeHandle();
+    executor_ = Executor::named("stages of " + nh.getNamespace());
+    queue_ = std::make_unique<Executor::Queue>(*executor_, rank);
+    nh.setCallbackQueue(queue_.get());
+    private_nh.setCallbackQueue(queue_.get());
     try {
-      stage_ = std::make_unique<Stage>(getNodeHandle(), getPrivateNodeHandle());
-      heartbeat_ = std::make_unique<Heartbeat>(getNodeHandle(), getName());
+      stage_ = std::make_unique<Stage>(nh, private_nh);
+      heartbeat_ = std::make_unique<Heartbeat>(nh, getName());
     } catch (const std::exception& e) {
       NODELET_FATAL("%s", e.what());
       throw;
     }
+    queue_->start();
   }
 
+  std::shared_ptr<Executor> executor_;
+  std::unique_ptr<Executor::Queue> queue_;
   std::unique_ptr<Stage> stage_;
   std::unique_ptr<Heartbeat> heartbeat_;
 };
