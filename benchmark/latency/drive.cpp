@@ -63,13 +63,14 @@ class Drive {
     thread_ = std::thread([this] { live(); });
     if (!comeToDrive()) return false;
     spin(kSettling);
-    call("compute/arbiter/use/preview_driver");
     measuring_ = true;
     const Stamp end = steadyNow() + fromSeconds(seconds);
     for (bool preview = true; steadyNow() < end && ros::ok(); preview = !preview) {
       if (state_ != TruckStatus::STATE_ACTIVE) note("stop", ros::Time::now(), ros::Time::now());
       if (!comeToDrive()) return false;
-      call(preview ? "pilot/arbiter/use/preview_driver" : "pilot/arbiter/use/lidar_driver");
+      for (const std::string whose : {"pilot", "compute"}) {
+        call(whose + "/arbiter/use/" + (preview ? "preview_driver" : "lidar_driver"));
+      }
       spin(kTurn);
     }
     measuring_ = false;
