@@ -11,16 +11,19 @@
 
 namespace tunnel_pilot::shell {
 
-// Decisions before all else. The network, which needs the points alone, before the tunnel, which takes
-// three times as long; then whoever is nearer to the command, so that a scan is through before the next.
-// Pictures need not come at once.
-using ArbiterNodelet = StageNodelet<ArbiterRos, 0>;
-using LidarDriverNodelet = StageNodelet<LidarDriverRos, 1>;
-using PreviewDriverNodelet = StageNodelet<PreviewDriverRos, 2>;
-using CenterlineNodelet = StageNodelet<CenterlineRos, 3>;
-using WallSegmentationNodelet = StageNodelet<WallSegmentationRos, 4>;
-using ScanFilterNodelet = StageNodelet<ScanFilterRos, 5>;
-using MarkersNodelet = StageNodelet<MarkersRos, 6>;
+// On the way to the command: decisions before all else. The network, which needs the points alone,
+// before the tunnel, which takes three times as long; then whoever is nearer to the command, so that a
+// scan is through before the next. Pictures stand aside: no hanging picture shall hold up a command.
+constexpr char kPilot[] = "pilot";
+constexpr char kPictures[] = "pictures";
+
+using ArbiterNodelet = StageNodelet<ArbiterRos, kPilot, 0>;
+using LidarDriverNodelet = StageNodelet<LidarDriverRos, kPilot, 1>;
+using PreviewDriverNodelet = StageNodelet<PreviewDriverRos, kPilot, 2>;
+using CenterlineNodelet = StageNodelet<CenterlineRos, kPilot, 3>;
+using WallSegmentationNodelet = StageNodelet<WallSegmentationRos, kPilot, 4>;
+using ScanFilterNodelet = StageNodelet<ScanFilterRos, kPilot, 5>;
+using MarkersNodelet = StageNodelet<MarkersRos, kPictures, 0>;
 
 }  // namespace tunnel_pilot::shell
 

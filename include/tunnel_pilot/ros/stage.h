@@ -13,9 +13,9 @@
 namespace tunnel_pilot::shell {
 
 /// A stage as nodelet: its callbacks run one at a time, its heartbeat among them, in one thread with
-/// those of the other stages of its namespace in this manager; of lower `rank` first (Executor). A stage
-/// that refuses its parameters is not loaded; the log says why.
-template <class Stage, int rank>
+/// those of the other stages that name the same `executor` in this namespace and manager; of lower
+/// `rank` first (Executor). A stage that refuses its parameters is not loaded; the log says why.
+template <class Stage, const char* executor, int rank>
 class StageNodelet : public nodelet::Nodelet {
  public:
   ~StageNodelet() override {
@@ -26,7 +26,7 @@ class StageNodelet : public nodelet::Nodelet {
   void onInit() override {
     ros::NodeHandle nh = getNodeHandle();
     ros::NodeHandle private_nh = getPrivateNodeHandle();
-    executor_ = Executor::named("stages of " + nh.getNamespace());
+    executor_ = Executor::named(executor + (" of " + nh.getNamespace()));
     queue_ = std::make_unique<Executor::Queue>(*executor_, rank);
     nh.setCallbackQueue(queue_.get());
     private_nh.setCallbackQueue(queue_.get());
