@@ -94,6 +94,9 @@ std::string_view CanBridge::whyRefused(const Command& command, Stamp now) const 
   if (!inside(command.speed, 0.0, parameters_.max_speed)) return "speed out of range";
   if (!inside(command.acceleration, 0.0, parameters_.max_acceleration))
     return "acceleration out of range";
+  if (!isKnown(command.mode)) return "unknown mode";
+  if (!isKnown(command.source)) return "unknown source";
+  if (!isKnown(command.reason)) return "unknown reason";
   if (command.stamp > now + fromSeconds(parameters_.future_tolerance)) return "stamp lies in the future";
   const bool lower = command_ && command.sequence + sequence_offset_ < command_->command.sequence;
   if (lower && (isEngaged(status_.state) || status_.state == S::kStopping)) return "sequence decreases";
@@ -113,7 +116,7 @@ void CanBridge::rejectCommand(const Command& command, std::string_view why, Stam
   ++status_.commands_rejected;
   status_.command_rejection = why;
   if (!command.stop) return;
-  raise(Event::kCommandStop, now, command.reason);
+  raise(Event::kCommandStop, now, isKnown(command.reason) ? command.reason : Reason::kProposalInvalid);
   sendIfDue(now);
 }
 
@@ -420,9 +423,9 @@ void CanBridge::sendIfDue(Stamp now) {
   if (!sender_.send(command, info, composeStatus(now), bus_, now)) return;
   transmit_.sent(std::max(bus_.inFlight(), in_flight) - in_flight, now);
   sent_angle_ = command.articulation_angle;
-  // After sets that the bus refused (it is down, or claims its address) the angle begins at the measured
-  // one.
-  steering_sent_ = command.steering_enable && !sender_.broken();
+  // When the bus takes no commands (it is down, or claims its address) the angle begins at the measured
+  // one. One that takes the command and nothing more has let the angle out.
+  steering_sent_ = command.steering_enable && !sender_.silent();
   sent_at_ = tick_time_.now();
 }
 

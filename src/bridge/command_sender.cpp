@@ -50,7 +50,9 @@ bool CommandSender::send(can::TruckCommandFrame command, can::CommandInfoFrame i
   command.counter = info.counter = status.counter = counter_ = can::nextCounter(counter_);
   sent_at_[sets_sent_++ % kMaxFrames] = counted_;
   stop_told_ = command.stop;
-  if (sendOne(command, bus) && sendOne(info, bus) && sendOne(status, bus)) {
+  const bool command_sent = sendOne(command, bus);
+  refused_in_row_ = command_sent ? 0 : refused_in_row_ + 1;
+  if (command_sent && sendOne(info, bus) && sendOne(status, bus)) {
     failed_in_row_ = 0;
   } else {
     ++failed_in_row_;

@@ -2,6 +2,10 @@
 
 namespace tunnel_pilot::supervision {
 
+bool isKnown(Mode mode) { return mode <= Mode::kTeleoperation; }
+bool isKnown(Source source) { return source <= Source::kHold; }
+bool isKnown(Reason reason) { return reason <= Reason::kProcessSilent; }
+
 std::string toString(Mode mode) {
   switch (mode) {
     case Mode::kStandby:

@@ -752,6 +752,19 @@ TEST(CommandSender, ASetThatWasNotTakenToItsLastFrameFails) {
   EXPECT_EQ(sender.setsFailed(), 0u);
 }
 
+TEST(CommandSender, IsSilentWhenThreeCommandsInARowWereRefusedNotWhenTheirSetsBroke) {
+  ShortBus none(0), one(1);
+  CommandSender sender(0.02);
+  for (int set = 0; set < 3; ++set) {
+    EXPECT_FALSE(sender.silent());
+    sender.send({}, {}, {}, none, ms(20 * set));
+  }
+  EXPECT_TRUE(sender.silent());
+  sender.send({}, {}, {}, one, ms(60));
+  EXPECT_FALSE(sender.silent());
+  EXPECT_TRUE(sender.broken());
+}
+
 // -------- link
 
 TEST(TruckLink, AnyFrameOfOurOwnFromElsewhereIsAForeignSenders) {

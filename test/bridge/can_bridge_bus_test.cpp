@@ -39,6 +39,22 @@ TEST_F(CanBridgeBus, WithTwoSetsInFlightNotEvenAStopIsWritten) {
   EXPECT_TRUE(rig.judge.last->stop);
 }
 
+// The angle that went out counts, not the measured one, to which it would jump.
+TEST_F(CanBridgeBus, OfSetsOfWhichTheBusTakesTheCommandAloneTheAngleGoesOn) {
+  rig.drive();
+  rig.valve_stuck = true;
+  rig.command.articulation_angle = 0.1;
+  rig.runToSet();
+  bus->takeCommandsOnly(true);
+  const double before = rig.judge.last->articulation_angle;
+  for (int set = 0; set < 8; ++set) {
+    rig.runToSet();
+    EXPECT_GT(rig.judge.last->articulation_angle, before) << set;
+  }
+  bus->takeCommandsOnly(false);
+  rig.run(0.1);
+}
+
 // After a while without sets, stops that come and go are told at once again, up to the bound of 16 sets.
 TEST_F(CanBridgeBus, TheTimeThatSetsAreInFlightCountsForTheBoundOnTheRate) {
   rig.run(1.5);

@@ -498,6 +498,48 @@ TEST_F(CanBridgeTest, AnArbiterThatStartsAgainWhileTheTruckStopsIsRefused) {
   EXPECT_EQ(rig.bridge->status().command_rejection, "sequence decreases");
 }
 
+TEST_F(CanBridgeTest, ACommandWithACodeThatNobodyKnowsIsRefused) {
+  const auto refusal = [this](const Command& command) {
+    rig.bridge->setCommand(command, rig.now);
+    return rig.bridge->status().command_rejection;
+  };
+  rig.run(1.5);
+  rig.arbiter_alive = false;
+  Command command = rig.command;
+  command.sequence = 1u << 20;
+  command.stamp = rig.now;
+  command.mode = static_cast<supervision::Mode>(4);
+  EXPECT_EQ("unknown mode", refusal(command));
+  command.mode = supervision::Mode::kAutonomous;
+  command.source = static_cast<supervision::Source>(9);
+  EXPECT_EQ("unknown source", refusal(command));
+  command.source = supervision::Source::kHold;
+  command.reason = static_cast<Reason>(28);
+  EXPECT_EQ("unknown reason", refusal(command));
+  command.reason = Reason::kProcessSilent;
+  command.mode = supervision::Mode::kTeleoperation;
+  const auto rejected = rig.bridge->status().commands_rejected;
+  rig.bridge->setCommand(command, rig.now);
+  EXPECT_EQ(rejected, rig.bridge->status().commands_rejected) << "the last of each are known";
+}
+
+// A source above 15 has no room in TP_COMMAND_INFO: the set would break off behind the command.
+TEST_F(CanBridgeTest, AStopWithCodesThatNobodyKnowsStopsAndItsSetsAreWhole) {
+  rig.drive();
+  Command command = rig.command;
+  command.sequence = 1u << 20;
+  command.stamp = rig.now;
+  command.stop = true;
+  command.source = static_cast<supervision::Source>(200);
+  command.reason = static_cast<Reason>(250);
+  rig.bridge->setCommand(command, rig.now);
+  rig.pump();
+  EXPECT_EQ(SafetyState::kStopping, rig.state());
+  EXPECT_EQ(Reason::kProposalInvalid, rig.reason());
+  EXPECT_TRUE(rig.judge.last->stop);
+  EXPECT_EQ(rig.judge.last->counter, rig.judge.last_info->counter);
+}
+
 // -------- stopping
 
 TEST_F(CanBridgeTest, OperatorsStopIsOnTheBusWithinTheCallInEveryState) {

@@ -12,8 +12,8 @@
 
 namespace tunnel_pilot::bridge {
 
-/// A wire that may keep back the proof that frames were sent, and counts how often it is asked to
-/// discard them.
+/// A wire that may keep back the proof that frames were sent, or take of each set the command alone, and
+/// counts how often it is asked to discard frames.
 class HoldingBus : public can::Bus {
  public:
   explicit HoldingBus(can::Bus& wire) : wire_(wire) {}
@@ -23,9 +23,11 @@ class HoldingBus : public can::Bus {
     holds_ = false;
     in_flight_ = 0;
   }
+  void takeCommandsOnly(bool only) { commands_only_ = only; }
   int discards() const { return discards_; }
 
   bool send(const can::Frame& frame) override {
+    if (commands_only_ && frame.id != can::kTpCommandId) return false;
     const bool taken = wire_.send(frame);
     if (taken && holds_) ++in_flight_;
     return taken;
@@ -40,6 +42,7 @@ class HoldingBus : public can::Bus {
  private:
   can::Bus& wire_;
   bool holds_ = false;
+  bool commands_only_ = false;
   std::uint64_t in_flight_ = 0;
   int discards_ = 0;
 };

@@ -507,5 +507,15 @@ TEST(ArbiterEdge, LimitsHitWhileNobodyIsEngagedDoNotCount) {
   EXPECT_FALSE(bench.cycle().degraded);
 }
 
+TEST(Codes, ExactlyThoseThatHaveWordsAreKnown) {
+  for (int number = 0; number < 256; ++number) {
+    EXPECT_EQ(toString(static_cast<Mode>(number)) != "unknown mode", isKnown(static_cast<Mode>(number)));
+    EXPECT_EQ(toString(static_cast<Source>(number)) != "unknown source",
+              isKnown(static_cast<Source>(number)));
+    EXPECT_EQ(toString(static_cast<Reason>(number)) != "unknown reason",
+              isKnown(static_cast<Reason>(number)));
+  }
+}
+
 }  // namespace
 }  // namespace tunnel_pilot::supervision

@@ -38,12 +38,19 @@ class CommandSender {
   /// for that, no time has passed.
   void forgetTime(Stamp now);
 
-  bool broken() const { return failed_in_row_ >= 3; }  ///< three sets in a row could not be sent
+  bool broken() const {
+    return failed_in_row_ >= kInRow;
+  }  ///< of the last three sets none went out whole
+  bool silent() const {
+    return refused_in_row_ >= kInRow;
+  }  ///< of the last three commands none went out
   std::uint32_t framesSent() const { return frames_sent_; }
   std::uint32_t setsFailed() const { return sets_failed_; }    ///< bus full or down, or not encodable
   std::uint32_t setsBlocked() const { return sets_blocked_; }  ///< by the bound on the rate
 
  private:
+  static constexpr int kInRow = 3;
+
   template <class Fields>
   bool sendOne(const Fields& fields, can::Bus& bus);
   bool withinRate() const;
@@ -58,6 +65,7 @@ class CommandSender {
   std::array<Stamp, kMaxFrames> sent_at_{};  ///< ring of the last sets, by that time
   std::size_t sets_sent_ = 0;
   int failed_in_row_ = 0;
+  int refused_in_row_ = 0;
   std::uint32_t frames_sent_ = 0;
   std::uint32_t sets_failed_ = 0;
   std::uint32_t sets_blocked_ = 0;

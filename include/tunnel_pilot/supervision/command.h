@@ -56,6 +56,11 @@ enum class Reason : std::uint8_t {
   kProcessSilent = 27,    ///< a process of the pilot gives no sign of life
 };
 
+/// False for a number that is none of these: a message may hold any.
+bool isKnown(Mode mode);
+bool isKnown(Source source);
+bool isKnown(Reason reason);
+
 std::string toString(Mode mode);
 std::string toString(Source source);
 /// The reason in words an operator understands.
