@@ -24,6 +24,10 @@ go on from, the campaign moves it back without its wheels turning, and the walls
 
 ## What runs found
 
+- `counter`, `rate`, `source not told`, six frames of seed 27: a command of the second publisher asked for a stop and named a source above 15, for
+  which TP_COMMAND_INFO has no room. The bridge took it, and each of its sets broke off behind TP_COMMAND; to the bridge the bus had refused
+  them, so it began each angle at the measured one. Commands with codes that nobody knows are refused now (the stop counts), and of a bus that takes the
+  command alone the angle that went out counts. Before, the arbiter's next command had as a rule come soon enough.
 - `old measurement`, six frames of seed 23: a spoilt scan between two that are the same made the second one fresh, and one from the future was
   waited for until it was of the present. The filter compares with the last scan that could be used now, and what is more than
   50 ms ahead is not waited for.
