@@ -10,130 +10,138 @@ namespace {
 
 using namespace vector_math;
 
-constexpr std::size_t kStrip = 2 * kWidth;  // inputs at a time of rows
-constexpr std::size_t kRowBlock = 5;        // outputs at a time of rows
-constexpr std::size_t kColumnBlock = 32;    // outputs at a time of columns
-constexpr std::size_t kChannelBlock = 16;   // channels at a time of a convolution
-constexpr std::size_t kPositionBlock = 4;   // positions at a time of a convolution
-constexpr std::size_t kFewOutputs = 16;     // for which rows are quicker than columns
-constexpr std::size_t kRoom = 64;           // behind buffers, for whole vectors and blocks
+constexpr std::size_t kStrip = 16;         // inputs at a time of rows
+constexpr std::size_t kRowBlock = 5;       // outputs at a time of rows
+constexpr std::size_t kColumnBlock = 32;   // outputs at a time of columns
+constexpr std::size_t kChannelBlock = 16;  // channels at a time of a convolution
+constexpr std::size_t kColumnStep = 8;     // outputs or channels are laid out in multiples of it
+constexpr std::size_t kPositionBlock = 4;  // positions at a time of a convolution
+constexpr std::size_t kFewOutputs = 16;    // for which rows are quicker than columns
+constexpr std::size_t kRoom = 64;          // behind buffers, for whole vectors and blocks
 
 constexpr std::size_t roundUp(std::size_t count, std::size_t to) { return (count + to - 1) / to * to; }
 
-// Sums of kRows outputs over all inputs: two accumulators each, of even and odd vectors. `w` moves on.
-template <std::size_t kRows>
-TUNNEL_PILOT_INLINE void rowBlock(const float*& w, const float* bias, const float* x, std::size_t count,
-                                  float* y) {
-  Floats even[kRows] = {};
-  Floats odd[kRows] = {};
+// Sums of kRows outputs over all inputs, each with an accumulator for every lane of a strip. `w` moves
+// on. `rest` is a strip of the inputs behind the last whole one, and zeros. The sums are stored as a
+// vector, as which they are loaded next: a load of what several stores wrote would wait for them.
+template <typename Floats, std::size_t kRows>
+TUNNEL_PILOT_INLINE void rowBlock(const Layer& layer, const float*& w, const float* bias, const float* x,
+                                  const float* rest, float* y) {
+  constexpr std::size_t kVectors = kStrip / kLanes<Floats>;
+  Floats sums[kRows][kVectors] = {};
   const auto strip = [&](const float* from) __attribute__((always_inline)) {
-    Floats first;
-    Floats second;
-    load(first, from);
-    load(second, from + kWidth);
-    for (std::size_t r = 0; r < kRows; ++r) {
-      addProduct(even[r], w + kStrip * r, first);
-      addProduct(odd[r], w + kStrip * r + kWidth, second);
+    for (std::size_t v = 0; v < kVectors; ++v) {
+      Floats inputs;
+      load(inputs, from + kLanes<Floats> * v);
+      for (std::size_t r = 0; r < kRows; ++r) {
+        addProduct(sums[r][v], w + kStrip * r + kLanes<Floats> * v, inputs);
+      }
     }
     w += kStrip * kRows;
   };
-  const std::size_t whole = count / kStrip * kStrip;
-  for (std::size_t k = 0; k < whole; k += kStrip) strip(x + k);
-  if (whole < count) {
-    float rest[kStrip] = {};
-    for (std::size_t k = whole; k < count; ++k) rest[k - whole] = x[k];
-    strip(rest);
-  }
-  for (std::size_t r = 0; r < kRows; ++r) {
-    const Floats s = even[r] + odd[r];
-    y[r] = bias[r] + (((s[0] + s[4]) + (s[1] + s[5])) + ((s[2] + s[6]) + (s[3] + s[7])));
-  }
+  std::size_t k = 0;
+  for (; k + kStrip <= layer.kernel; k += kStrip) strip(x + k);
+  if (k < layer.kernel) strip(rest);
+  Eight out = {};
+  for (std::size_t r = 0; r < kRows; ++r) out[r] = bias[r] + sumStrip(sums[r]);
+  store(y, out);
 }
 
+// For at least kStrip inputs. One or two outputs wait for their additions: shorter vectors, with two
+// accumulators each, wait half as long.
+template <typename Floats>
 TUNNEL_PILOT_INLINE void rows(const Layer& layer, const float* w, const float* bias, const float* x,
                               float* y) {
   const std::size_t inputs = layer.kernel;
+  float end[2 * kStrip] = {};  // the last strip of inputs, whole or not, with zeros behind
+  std::copy_n(x + inputs - kStrip, kStrip, end);
+  const float* const rest = end + kStrip - inputs % kStrip;
   std::size_t r = 0;
-  for (; r + kRowBlock <= layer.channels_out; r += kRowBlock)
-    rowBlock<kRowBlock>(w, bias + r, x, inputs, y + r);
+  for (; r + kRowBlock <= layer.channels_out; r += kRowBlock) {
+    rowBlock<Floats, kRowBlock>(layer, w, bias + r, x, rest, y + r);
+  }
   switch (layer.channels_out - r) {
     case 4:
-      return rowBlock<4>(w, bias + r, x, inputs, y + r);
+      return rowBlock<Floats, 4>(layer, w, bias + r, x, rest, y + r);
     case 3:
-      return rowBlock<3>(w, bias + r, x, inputs, y + r);
+      return rowBlock<Floats, 3>(layer, w, bias + r, x, rest, y + r);
     case 2:
-      return rowBlock<2>(w, bias + r, x, inputs, y + r);
+      return rowBlock<Short<Floats>, 2>(layer, w, bias + r, x, rest, y + r);
     case 1:
-      return rowBlock<1>(w, bias + r, x, inputs, y + r);
+      return rowBlock<Short<Floats>, 1>(layer, w, bias + r, x, rest, y + r);
     default:
       return;
   }
 }
 
-// Sums of kVectors * 8 outputs, even and odd inputs apart. `w` moves on.
-template <std::size_t kVectors>
-TUNNEL_PILOT_INLINE void columnBlock(const float*& w, const float* bias, const float* x,
-                                     std::size_t count, float* y) {
+// Sums of kOutputs outputs, even and odd inputs apart. `w` moves on.
+template <typename Floats, std::size_t kOutputs>
+TUNNEL_PILOT_INLINE void columnBlock(const Layer& layer, const float*& w, const float* bias,
+                                     const float* x, float* y) {
+  constexpr std::size_t kWidth = kLanes<Floats>;
+  constexpr std::size_t kVectors = kOutputs / kWidth;
   Floats even[kVectors];
   Floats odd[kVectors] = {};
   for (std::size_t v = 0; v < kVectors; ++v) load(even[v], bias + kWidth * v);
   std::size_t k = 0;
-  for (; k + 2 <= count; k += 2) {
-    const Floats first = Floats{} + x[k];
-    const Floats second = Floats{} + x[k + 1];
+  for (; k + 2 <= layer.kernel; k += 2) {
+    const float first = x[k];
+    const float second = x[k + 1];
     for (std::size_t v = 0; v < kVectors; ++v) {
       addProduct(even[v], w + kWidth * v, first);
-      addProduct(odd[v], w + kWidth * (kVectors + v), second);
+      addProduct(odd[v], w + kOutputs + kWidth * v, second);
     }
-    w += 2 * kVectors * kWidth;
+    w += 2 * kOutputs;
   }
-  if (k < count) {
-    const Floats last = Floats{} + x[k];
+  if (k < layer.kernel) {
+    const float last = x[k];
     for (std::size_t v = 0; v < kVectors; ++v) addProduct(even[v], w + kWidth * v, last);
-    w += kVectors * kWidth;
+    w += kOutputs;
   }
   for (std::size_t v = 0; v < kVectors; ++v) store(y + kWidth * v, even[v] + odd[v]);
 }
 
+template <typename Floats>
 TUNNEL_PILOT_INLINE void columns(const Layer& layer, const float* w, const float* bias, const float* x,
                                  float* y) {
-  const std::size_t inputs = layer.kernel;
   std::size_t c = 0;
   for (; c + kColumnBlock <= layer.channels_out; c += kColumnBlock) {
-    columnBlock<kColumnBlock / kWidth>(w, bias + c, x, inputs, y + c);
+    columnBlock<Floats, kColumnBlock>(layer, w, bias + c, x, y + c);
   }
-  switch (roundUp(layer.channels_out - c, kWidth) / kWidth) {
-    case 4:
-      return columnBlock<4>(w, bias + c, x, inputs, y + c);
-    case 3:
-      return columnBlock<3>(w, bias + c, x, inputs, y + c);
-    case 2:
-      return columnBlock<2>(w, bias + c, x, inputs, y + c);
-    case 1:
-      return columnBlock<1>(w, bias + c, x, inputs, y + c);
+  switch (roundUp(layer.channels_out - c, kColumnStep)) {
+    case 32:
+      return columnBlock<Floats, 32>(layer, w, bias + c, x, y + c);
+    case 24:
+      return columnBlock<Short<Floats>, 24>(layer, w, bias + c, x, y + c);
+    case 16:
+      return columnBlock<Floats, 16>(layer, w, bias + c, x, y + c);
+    case 8:
+      return columnBlock<Short<Floats>, 8>(layer, w, bias + c, x, y + c);
     default:
       return;
   }
 }
 
-// kVectors * 8 channels at kPositions positions; `x` is the first signal at the first of them, `y` the
+// kChannels channels at kPositions positions; `x` is the first signal at the first of them, `y` the
 // first channel's output there.
-template <std::size_t kVectors, std::size_t kPositions>
+template <typename Floats, std::size_t kChannels, std::size_t kPositions>
 TUNNEL_PILOT_INLINE void tile(const Layer& layer, std::size_t positions, std::size_t channels,
                               const float* w, const float* bias, const float* x, float* y) {
+  constexpr std::size_t kWidth = kLanes<Floats>;
+  constexpr std::size_t kVectors = kChannels / kWidth;
   Floats sums[kPositions][kVectors];
   for (std::size_t p = 0; p < kPositions; ++p) {
     for (std::size_t v = 0; v < kVectors; ++v) load(sums[p][v], bias + kWidth * v);
   }
   for (std::size_t i = 0; i < layer.channels_in; ++i, x += layer.length_in) {
-    for (std::size_t k = 0; k < layer.kernel; ++k, w += kVectors * kWidth) {
+    for (std::size_t k = 0; k < layer.kernel; ++k, w += kChannels) {
       for (std::size_t p = 0; p < kPositions; ++p) {
-        const Floats value = Floats{} + x[p * layer.stride + k];
+        const float value = x[p * layer.stride + k];
         for (std::size_t v = 0; v < kVectors; ++v) addProduct(sums[p][v], w + kWidth * v, value);
       }
     }
   }
-  float out[kPositions][kVectors * kWidth];
+  float out[kPositions][kChannels];
   for (std::size_t p = 0; p < kPositions; ++p) {
     for (std::size_t v = 0; v < kVectors; ++v) store(out[p] + kWidth * v, sums[p][v]);
   }
@@ -142,42 +150,51 @@ TUNNEL_PILOT_INLINE void tile(const Layer& layer, std::size_t positions, std::si
   }
 }
 
-template <std::size_t kVectors>
+template <typename Floats, std::size_t kChannels>
 TUNNEL_PILOT_INLINE void channelBlock(const Layer& layer, std::size_t channels, const float* w,
                                       const float* bias, const float* x, float* y) {
   const std::size_t positions = layer.lengthOut();
   std::size_t p = 0;
   for (; p + kPositionBlock <= positions; p += kPositionBlock) {
-    tile<kVectors, kPositionBlock>(layer, positions, channels, w, bias, x + p * layer.stride, y + p);
+    tile<Floats, kChannels, kPositionBlock>(layer, positions, channels, w, bias, x + p * layer.stride,
+                                            y + p);
   }
   for (; p < positions; ++p) {
-    tile<kVectors, 1>(layer, positions, channels, w, bias, x + p * layer.stride, y + p);
+    tile<Floats, kChannels, 1>(layer, positions, channels, w, bias, x + p * layer.stride, y + p);
   }
 }
 
+template <typename Floats>
 TUNNEL_PILOT_INLINE void convolution(const Layer& layer, const float* w, const float* bias,
                                      const float* x, float* y) {
   const std::size_t a_block = layer.channels_in * layer.kernel * kChannelBlock;
   for (std::size_t c = 0; c < layer.channels_out; c += kChannelBlock, w += a_block) {
     const std::size_t channels = layer.channels_out - c;
     float* const out = y + c * layer.lengthOut();
-    if (channels > kWidth) {
-      channelBlock<2>(layer, channels < kChannelBlock ? channels : kChannelBlock, w, bias + c, x, out);
+    if (channels > kColumnStep) {
+      channelBlock<Floats, kChannelBlock>(layer, channels < kChannelBlock ? channels : kChannelBlock, w,
+                                          bias + c, x, out);
     } else {
-      channelBlock<1>(layer, channels, w, bias + c, x, out);
+      channelBlock<Short<Floats>, kColumnStep>(layer, channels, w, bias + c, x, out);
     }
   }
 }
 
 // Activation, and what is handed on.
+template <typename Floats>
 TUNNEL_PILOT_INLINE void finish(const Layer& layer, const float* x, float* y) {
   const std::size_t own = layer.outputs() - layer.passed;
-  activate(layer.activation, y, own);
+  if (own > kLanes<Eight>) {
+    activate<Floats>(layer.activation, y, own);
+  } else {
+    activate<Short<Floats>>(layer.activation, y, own);
+  }
   for (std::size_t i = 0; i < layer.passed; ++i) y[own + i] = x[layer.channels_in * layer.length_in + i];
 }
 
-// One function for all, since which of its variants suits the machine is looked up at every call.
-TUNNEL_PILOT_CLONES void runSteps(const Inference::Step* step, std::size_t count,
+// One function for all: what it calls is compiled for the instructions of that which calls it.
+template <typename Floats>
+TUNNEL_PILOT_INLINE void runSteps(const Inference::Step* step, std::size_t count,
                                   const float* parameters, const float* x, float* y, float* next) {
   for (std::size_t i = 0; i < count; ++i, ++step) {
     const Layer& layer = step->layer;
@@ -185,21 +202,41 @@ TUNNEL_PILOT_CLONES void runSteps(const Inference::Step* step, std::size_t count
     const float* const bias = parameters + step->biases;
     switch (step->layout) {
       case Inference::Layout::kRows:
-        rows(layer, w, bias, x, y);
+        rows<Floats>(layer, w, bias, x, y);
         break;
       case Inference::Layout::kColumns:
-        columns(layer, w, bias, x, y);
+        columns<Floats>(layer, w, bias, x, y);
         break;
       case Inference::Layout::kConvolution:
-        convolution(layer, w, bias, x, y);
+        convolution<Floats>(layer, w, bias, x, y);
         break;
     }
-    finish(layer, x, y);
+    finish<Floats>(layer, x, y);
     x = y;
     float* const free = next;
     next = y;
     y = free;
   }
+}
+
+#if defined(__x86_64__)
+__attribute__((target("avx512f,avx512vl"))) void runWithAvx512(const Inference::Step* step,
+                                                               std::size_t count,
+                                                               const float* parameters, const float* x,
+                                                               float* y, float* next) {
+  runSteps<Sixteen>(step, count, parameters, x, y, next);
+}
+
+__attribute__((target("avx2"))) void runWithAvx2(const Inference::Step* step, std::size_t count,
+                                                 const float* parameters, const float* x, float* y,
+                                                 float* next) {
+  runSteps<Eight>(step, count, parameters, x, y, next);
+}
+#endif
+
+void runAnywhere(const Inference::Step* step, std::size_t count, const float* parameters, const float* x,
+                 float* y, float* next) {
+  runSteps<Four>(step, count, parameters, x, y, next);
 }
 
 Inference::Layout layoutOf(const Layer& layer) {
@@ -210,7 +247,20 @@ Inference::Layout layoutOf(const Layer& layer) {
 
 }  // namespace
 
-Inference::Inference(const Network& network) : inputs_(network.inputs()), outputs_(network.outputs()) {
+std::vector<Inference::Kernel> Inference::kernels() {
+  std::vector<Kernel> kernels;
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl")) {
+    kernels.push_back(runWithAvx512);
+  }
+  if (__builtin_cpu_supports("avx2")) kernels.push_back(runWithAvx2);
+#endif
+  kernels.push_back(runAnywhere);
+  return kernels;
+}
+
+Inference::Inference(const Network& network)
+    : kernel_(kernels().front()), inputs_(network.inputs()), outputs_(network.outputs()) {
   const double* parameters = network.parameters().data();
   std::size_t width = 0;
   for (const Layer& layer : network.layers()) {
@@ -256,7 +306,7 @@ void Inference::layRows(const Layer& layer, const double* weights) {
 void Inference::layColumns(const Layer& layer, const double* weights, std::size_t block) {
   const std::size_t inputs = layer.channels_in * layer.kernel;
   for (std::size_t first = 0; first < layer.channels_out; first += block) {
-    const std::size_t end = first + std::min(block, roundUp(layer.channels_out - first, kWidth));
+    const std::size_t end = first + std::min(block, roundUp(layer.channels_out - first, kColumnStep));
     for (std::size_t k = 0; k < inputs; ++k) {
       for (std::size_t c = first; c < end; ++c) {
         const bool inside = c < layer.channels_out;
@@ -267,7 +317,7 @@ void Inference::layColumns(const Layer& layer, const double* weights, std::size_
 }
 
 void Inference::run(const float* input, float* output) {
-  runSteps(steps_.data(), steps_.size(), parameters_.data(), input, front_.data(), back_.data());
+  kernel_(steps_.data(), steps_.size(), parameters_.data(), input, front_.data(), back_.data());
   const Values& last = steps_.size() % 2 == 1 ? front_ : back_;
   std::copy_n(last.data(), outputs_, output);
 }

@@ -3,12 +3,23 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <random>
 
 #include "tunnel_pilot/neural/batch_pass.h"
 
 namespace tunnel_pilot::neural {
+
+struct InferenceAccess {
+  static std::size_t kernels() { return Inference::kernels().size(); }
+  static Inference withKernel(std::size_t i, const Network& network) {
+    Inference inference(network);
+    inference.kernel_ = Inference::kernels()[i];
+    return inference;
+  }
+};
+
 namespace {
 
 constexpr Activation kActivations[] = {Activation::kLinear, Activation::kTanh, Activation::kSigmoid,
@@ -180,6 +191,44 @@ TEST(Inference, ACopyGivesTheSame) {
   original.run(input.data(), a.data());
   copy.run(input.data(), b.data());
   EXPECT_EQ(a, b);
+}
+
+std::vector<std::uint32_t> bitsOf(Inference inference, const std::vector<float>& input) {
+  std::vector<float> output(inference.outputs());
+  inference.run(input.data(), output.data());
+  std::vector<std::uint32_t> bits(output.size());
+  std::memcpy(bits.data(), output.data(), output.size() * sizeof(float));
+  return bits;
+}
+
+void expectTheSameOfAllKernels(const Network& network, const std::vector<float>& input) {
+  const std::vector<std::uint32_t> bits = bitsOf(InferenceAccess::withKernel(0, network), input);
+  for (std::size_t i = 1; i < InferenceAccess::kernels(); ++i) {
+    ASSERT_EQ(bitsOf(InferenceAccess::withKernel(i, network), input), bits) << "kernel " << i;
+  }
+}
+
+TEST(Inference, BitsAreTheSameWithAllInstructionsOfThisMachine) {
+  std::mt19937_64 random(7);
+  RecordProperty("kernels", static_cast<int>(InferenceAccess::kernels()));
+  for (int i = 0; i < 1500 && !HasFatalFailure(); ++i) {
+    SCOPED_TRACE(i);
+    Network network = randomNetwork(random);
+    randomise(network, random);
+    expectTheSameOfAllKernels(network, randomInput(network.inputs(), random));
+  }
+}
+
+TEST(Inference, BitsAreTheSameForEveryNumberOfOutputsAndRemainderOfInputs) {
+  std::mt19937_64 random(8);
+  for (std::size_t inputs = 1; inputs <= 40; ++inputs) {
+    for (std::size_t outputs = 1; outputs <= 40 && !HasFatalFailure(); ++outputs) {
+      SCOPED_TRACE(testing::Message() << inputs << " " << outputs);
+      Network network({Layer::dense(inputs, outputs, Activation::kSigmoid)});
+      randomise(network, random);
+      expectTheSameOfAllKernels(network, randomInput(inputs, random));
+    }
+  }
 }
 
 // The sum of the outputs' bits over many networks: the same on every machine, whatever its vectors. The

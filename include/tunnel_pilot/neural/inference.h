@@ -13,6 +13,7 @@ namespace tunnel_pilot::neural {
 /// for outputs of magnitude 1. Keeps a copy of the parameters, laid out for vector instructions.
 /// Allocates nothing after construction. Sums run in an order that the source fixes, so that results are
 /// the same with every vector width. An input that is not finite makes outputs that are not.
+/// Compiled once each for AVX-512, AVX2 and any machine; the constructor takes the machine's best.
 ///
 /// One of three layouts a layer, all read from front to end:
 ///   rows         few outputs: weights of up to five outputs by turns, sixteen inputs at a time, so that
@@ -38,7 +39,7 @@ class Inference {
   };
 
  private:
-  friend struct InferenceAccess;  // a test that spoils parameters
+  friend struct InferenceAccess;  // tests that spoil parameters or choose the kernel
 
   // Vectors that begin at the begin of a cache line are loaded at once.
   template <typename T>
@@ -57,10 +58,15 @@ class Inference {
   };
   using Values = std::vector<float, Aligned<float>>;
 
+  using Kernel = void (*)(const Step* step, std::size_t count, const float* parameters, const float* x,
+                          float* y, float* next);
+  static std::vector<Kernel> kernels();  // those for this machine, the quickest first
+
   void lay(const Layer& layer, const double* parameters);
   void layRows(const Layer& layer, const double* weights);
   void layColumns(const Layer& layer, const double* weights, std::size_t block);
 
+  Kernel kernel_;
   std::size_t inputs_, outputs_;
   std::vector<Step> steps_;
   Values parameters_;
