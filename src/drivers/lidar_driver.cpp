@@ -146,7 +146,7 @@ LidarDriver::Refusal LidarDriver::steer(const geometry::Scan& scan, const Motion
                                         Proposal& proposal) {
   const Stamp age = now - scan.stamp;
   if (age < Stamp::zero() || toSeconds(age) > parameters_.max_scan_age) return Refusal::kScanAge;
-  if (!isFinite(motion)) return Refusal::kMotion;
+  if (!isUsable(motion)) return Refusal::kMotion;
   steering_.observe(motion);
   const double meets = steering_.articulationAhead(now);
   truck_ = {steering_.motion().articulation,
@@ -229,7 +229,7 @@ std::string toString(LidarDriver::Refusal refusal) {
     case Refusal::kScanAge:
       return "no fresh scan";
     case Refusal::kMotion:
-      return "motion feedback is not finite";
+      return "motion feedback is not finite or beyond 1e6";
     case Refusal::kScan:
       return "the scan has no 761 beams or no return";
     case Refusal::kOutputs:

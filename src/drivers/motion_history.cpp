@@ -1,14 +1,22 @@
 #include "tunnel_pilot/drivers/motion_history.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace tunnel_pilot::drivers {
 
-bool isFinite(const Motion& motion) {
-  return std::isfinite(motion.pose.x) && std::isfinite(motion.pose.y) &&
-         std::isfinite(motion.pose.heading) && std::isfinite(motion.speed) &&
-         std::isfinite(motion.yaw_rate) && std::isfinite(motion.articulation) &&
-         std::isfinite(motion.articulation_rate);
+namespace {
+
+constexpr double kLargest = 1e6;  // [m], [rad], [m/s], [rad/s]
+
+}  // namespace
+
+bool isUsable(const Motion& motion) {
+  const std::array<double, 7> numbers = {
+      motion.pose.x,   motion.pose.y,       motion.pose.heading,     motion.speed,
+      motion.yaw_rate, motion.articulation, motion.articulation_rate};
+  // Written so that numbers that are none fail.
+  return std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::abs(x) <= kLargest; });
 }
 
 geometry::Pose advanced(const geometry::Pose& pose, double speed, double yaw_rate, double time) {
@@ -19,7 +27,7 @@ geometry::Pose advanced(const geometry::Pose& pose, double speed, double yaw_rat
 }
 
 bool MotionHistory::add(const Motion& motion, Stamp now) {
-  if (!isFinite(motion) || motion.stamp > now + max_ahead_) return false;
+  if (!isUsable(motion) || motion.stamp > now + max_ahead_) return false;
   if (size_ > 0 && motion.stamp <= latest().stamp) return false;
   newest_ = (newest_ + 1) % ring_.size();
   ring_[newest_] = motion;

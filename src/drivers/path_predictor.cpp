@@ -60,7 +60,7 @@ void PathPredictor::reset() {
 bool PathPredictor::usable(const perception::Tunnel& tunnel, const Motion& motion, Stamp now) const {
   const Stamp age = now - tunnel.state.stamp;
   return tunnel.state.valid && !tunnel.centerline.empty() && isFinite(tunnel.state) &&
-         drivers::isFinite(motion) && motion.stamp <= now + MotionHistory::kMaxAhead &&
+         drivers::isUsable(motion) && motion.stamp <= now + MotionHistory::kMaxAhead &&
          age >= -MotionHistory::kReach && toSeconds(age) <= parameters_.max_tunnel_age;
 }
 

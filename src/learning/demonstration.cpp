@@ -64,7 +64,7 @@ void Demonstration::reset() {
 std::vector<Lesson> Demonstration::take() { return std::exchange(lessons_, {}); }
 
 void Demonstration::addMotion(const drivers::Motion& motion) {
-  if (!drivers::isFinite(motion)) return;
+  if (!drivers::isUsable(motion)) return;
   if (!motions_.empty()) {
     const Stamp passed = motion.stamp - motions_.back().motion.stamp;
     if (passed <= Stamp::zero()) return;

@@ -151,7 +151,7 @@ void ArbiterRos::updateMotion() {
   ++motion_refused_;
   ROS_ERROR_THROTTLE(
       1.0, "arbiter: odom or joint_states holds %s",
-      drivers::isFinite(*motion) ? "a stamp from the future" : "a number that is not finite");
+      drivers::isUsable(*motion) ? "a stamp from the future" : "a number that is none or beyond 1e6");
 }
 
 void ArbiterRos::updateTunnel() {

@@ -87,8 +87,8 @@ void Arbiter::setTunnel(const perception::Tunnel& tunnel, Stamp now) {
 }
 
 bool Arbiter::setMotion(const drivers::Motion& motion, Stamp now) {
-  motion_finite_ = drivers::isFinite(motion);
-  if (!motion_finite_) return false;
+  motion_usable_ = drivers::isUsable(motion);
+  if (!motion_usable_) return false;
   const Stamp last = history_.empty() ? motion.stamp : history_.latest().stamp;
   if (!history_.empty() && motion.stamp <= last) return true;  // nothing new, and no sign of life
   if (!history_.add(motion, now)) return false;
@@ -238,13 +238,13 @@ void Arbiter::assessTunnel(Stamp now, Findings& findings) const {
 }
 
 bool Arbiter::motionHealthy(Stamp now) const {
-  return motion_finite_ && !history_.empty() &&
+  return motion_usable_ && !history_.empty() &&
          age(motion_received_, now) <= parameters_.motion_stop_age &&
          toSeconds(now - history_.latest().stamp) <= parameters_.max_stamp_age;
 }
 
 void Arbiter::assessMotion(Stamp now, Findings& findings) const {
-  if (!motion_received_ && motion_finite_) return findings.stopFor(Reason::kStartUp);
+  if (!motion_received_ && motion_usable_) return findings.stopFor(Reason::kStartUp);
   if (!motionHealthy(now)) findings.stopFor(Reason::kMotionStale);
   if (steering_monitor_.failed()) findings.stopFor(Reason::kTrackingError);
 }

@@ -286,7 +286,7 @@ class MotionJoiner {
 
   void take(const nav_msgs::Odometry& message) {
     const drivers::Motion odometry = tools::motionOf(message);
-    if (!drivers::isFinite(odometry) || (newest_ && odometry.stamp <= newest_->stamp)) return;
+    if (!drivers::isUsable(odometry) || (newest_ && odometry.stamp <= newest_->stamp)) return;
     before_ = newest_;
     newest_ = odometry;
   }

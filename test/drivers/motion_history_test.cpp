@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <limits>
+#include <vector>
 
 namespace tunnel_pilot::drivers {
 namespace {
@@ -53,6 +55,31 @@ TEST(MotionHistory, IgnoresOldAndNonFiniteMotion) {
   history.add(at(0.9, 5.0), kLater);
   history.add(at(1.1, std::numeric_limits<double>::quiet_NaN()), kLater);
   EXPECT_EQ(history.latest().stamp, fromSeconds(1.0));
+}
+
+TEST(Motion, IsUsableWhileEachOfItsNumbersIsOneUpToAMillion) {
+  using Number = std::function<double&(Motion&)>;
+  const std::vector<Number> numbers = {[](Motion& m) -> double& { return m.pose.x; },
+                                       [](Motion& m) -> double& { return m.pose.y; },
+                                       [](Motion& m) -> double& { return m.pose.heading; },
+                                       [](Motion& m) -> double& { return m.speed; },
+                                       [](Motion& m) -> double& { return m.yaw_rate; },
+                                       [](Motion& m) -> double& { return m.articulation; },
+                                       [](Motion& m) -> double& { return m.articulation_rate; }};
+  const auto usableWith = [&](std::size_t i, double value) {
+    Motion motion = at(1.0, 0.0);
+    numbers[i](motion) = value;
+    return isUsable(motion);
+  };
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    for (const double sign : {1.0, -1.0}) {
+      EXPECT_TRUE(usableWith(i, sign * 1e6)) << i;
+      for (const double beyond : {1.000001e6, 1e300, std::numeric_limits<double>::infinity(),
+                                  std::numeric_limits<double>::quiet_NaN()}) {
+        EXPECT_FALSE(usableWith(i, sign * beyond)) << i << " " << sign * beyond;
+      }
+    }
+  }
 }
 
 TEST(MotionHistory, IsNotStoppedByMotionFromTheFuture) {

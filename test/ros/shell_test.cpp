@@ -354,13 +354,13 @@ TEST(MotionInput, PassesOnNumbersThatAreNoneAndRecovers) {
   input.setOdometry(odometry(1.0, 2.0));
   input.setJointState(jointState(1.0, 0.2));
   input.setOdometry(odometry(2.0, kNan));
-  EXPECT_FALSE(drivers::isFinite(*input.motion()));
+  EXPECT_FALSE(drivers::isUsable(*input.motion()));
   input.setOdometry(odometry(3.0, 2.0));
-  EXPECT_TRUE(drivers::isFinite(*input.motion()));
+  EXPECT_TRUE(drivers::isUsable(*input.motion()));
   input.setJointState(jointState(3.0, kNan));
-  EXPECT_FALSE(drivers::isFinite(*input.motion()));
+  EXPECT_FALSE(drivers::isUsable(*input.motion()));
   input.setJointState(jointState(4.0, 0.3));
-  EXPECT_TRUE(drivers::isFinite(*input.motion()));
+  EXPECT_TRUE(drivers::isUsable(*input.motion()));
   EXPECT_EQ(0.3, input.motion()->articulation);
 }
 

@@ -121,6 +121,30 @@ TEST(ArbiterEdge, MotionThatNeverWasANumberIsNotWaitedFor) {
   EXPECT_EQ(bench.cycle().command.reason, Reason::kMotionStale);
 }
 
+TEST(ArbiterEdge, MotionFromBeyondAMillionIsRefusedAndStopsInTheSameCycle) {
+  for (const bool pose : {true, false}) {
+    ArbiterBench bench;
+    bench.drive();
+    drivers::Motion bad = bench.motion;
+    (pose ? bad.pose.x : bad.speed) = 1e300;
+    bad.stamp += milliseconds(10);
+    EXPECT_FALSE(bench.arbiter->setMotion(bad, bench.now)) << pose;
+    EXPECT_EQ(bench.arbiter->decide(bench.now).command.reason, Reason::kMotionStale) << pose;
+  }
+}
+
+TEST(ArbiterEdge, ASpeedBeyondAllSenseDoesNotBlindTheCorridorForWhatComesAfterIt) {
+  ArbiterBench bench;
+  bench.cycles(10);
+  drivers::Motion bad = bench.motion;
+  bad.speed = 1e300;
+  bad.stamp += milliseconds(10);
+  bench.arbiter->setMotion(bad, bench.now);
+  bench.cycles(20);
+  bench.obstacle = 4.0;
+  EXPECT_EQ(bench.cycles(5).command.reason, Reason::kObstacle);
+}
+
 TEST(ArbiterEdge, MotionThatWasMeasuredLongAgoIsStale) {
   ArbiterBench bench;
   bench.drive();

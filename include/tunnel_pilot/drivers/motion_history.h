@@ -16,7 +16,7 @@ class MotionHistory {
 
   explicit MotionHistory(Stamp max_ahead = kMaxAhead) : max_ahead_(max_ahead) {}
 
-  /// Takes a motion newer than the last one. False: it is older, not finite, or farther ahead of `now`
+  /// Takes a motion newer than the last one. False: it is older, not usable, or farther ahead of `now`
   /// than `max_ahead`, and is left out; one from the future would keep out all that come after it.
   /// Allocation-free.
   bool add(const Motion& motion, Stamp now);
@@ -41,7 +41,8 @@ class MotionHistory {
 /// `pose` moved on for `time` [s] (negative: back) with constant speed and yaw rate.
 geometry::Pose advanced(const geometry::Pose& pose, double speed, double yaw_rate, double time);
 
-/// True when every number is finite.
-bool isFinite(const Motion& motion);
+/// True when every number is one, and of a magnitude of at most 1e6: a pose farther away than 1000 km
+/// resolves no nanometre any more, and squares of the largest numbers are none.
+bool isUsable(const Motion& motion);
 
 }  // namespace tunnel_pilot::drivers

@@ -115,8 +115,8 @@ class Arbiter {
   void setRejection(const ScanRejection& rejection, Stamp now);
   void setWalls(const perception::Walls& walls, Stamp now);
   void setTunnel(const perception::Tunnel& tunnel, Stamp now);
-  /// False: it is refused, because it is not finite, which stops the truck, or because its stamp lies
-  /// farther ahead of `now` than max_future.
+  /// False: it is refused, because it is not usable (drivers::isUsable), which stops the truck, or
+  /// because its stamp lies farther ahead of `now` than max_future.
   bool setMotion(const drivers::Motion& motion, Stamp now);
   void setTruckState(const TruckState& state, Stamp now);
 
@@ -239,7 +239,7 @@ class Arbiter {
   std::optional<Stamp> gap_ended_;  // when the last scan that was late came
   std::optional<Stamp> tunnel_received_, tunnel_valid_received_;
   std::optional<Stamp> motion_received_;
-  bool motion_finite_ = true;
+  bool motion_usable_ = true;
   TruckState truck_state_;
   std::optional<Stamp> truck_state_received_;
   bool standby_seen_ = false;  ///< the truck was neither engaged nor stopping once
