@@ -8,6 +8,14 @@ namespace tunnel_pilot::drivers {
 namespace {
 
 constexpr double kLargest = 1e6;  // [m], [rad], [m/s], [rad/s]
+// What odometry may err by from one message to the next, beyond what its own speeds say: far more than
+// its noise, far less than the room beside a truck in its drift.
+constexpr double kPoseError = 0.25;      // [m]
+constexpr double kHeadingError = 0.1;    // [rad]
+constexpr double kStampError = 0.05;     // [s]
+constexpr double kFastest = 15.0;        // [m/s] no truck's speed is higher, whatever is said
+constexpr double kFastestTurn = 1.5;     // [rad/s]
+constexpr double kLongestSilence = 1.0;  // [s] a truck that moves on for longer is somewhere else
 
 }  // namespace
 
@@ -17,6 +25,17 @@ bool isUsable(const Motion& motion) {
       motion.yaw_rate, motion.articulation, motion.articulation_rate};
   // Written so that numbers that are none fail.
   return std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::abs(x) <= kLargest; });
+}
+
+bool leadsTo(const Motion& before, const Motion& after) {
+  const double time = std::min(toSeconds(after.stamp - before.stamp), kLongestSilence) + kStampError;
+  const auto most = [time](double a, double b, double fastest) {
+    return std::min(std::max(std::abs(a), std::abs(b)), fastest) * time;
+  };
+  const double step = (after.pose.position() - before.pose.position()).norm();
+  const double turn = std::abs(geometry::wrapAngle(after.pose.heading - before.pose.heading));
+  return step <= kPoseError + most(before.speed, after.speed, kFastest) &&
+         turn <= kHeadingError + most(before.yaw_rate, after.yaw_rate, kFastestTurn);
 }
 
 geometry::Pose advanced(const geometry::Pose& pose, double speed, double yaw_rate, double time) {

@@ -190,6 +190,7 @@ void ArbiterRos::fillStatus(Diagnostics::Status& status) const {
   status.add("stop", command.stop);
   status.add("sequence", command.sequence);
   status.add("motion refused", motion_refused_);
+  status.add("odometry jumps", arbiter_.odometryJumps());
   if (!tuning_.refusal().empty()) status.add("tuning refused", tuning_.refusal());
   if (!unheard_.empty()) status.add("nothing heard yet on", unheardTopics());
 }

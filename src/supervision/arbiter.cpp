@@ -91,10 +91,21 @@ bool Arbiter::setMotion(const drivers::Motion& motion, Stamp now) {
   if (!motion_usable_) return false;
   const Stamp last = history_.empty() ? motion.stamp : history_.latest().stamp;
   if (!history_.empty() && motion.stamp <= last) return true;  // nothing new, and no sign of life
+  const bool jumped = !history_.empty() && !drivers::leadsTo(history_.latest(), motion);
   if (!history_.add(motion, now)) return false;
+  if (jumped) forgetPlaces();
+  odometry_jumps_ += jumped ? 1 : 0;
   if (motion.stamp > last) yaw_.update(motion, toSeconds(motion.stamp - last));
   motion_received_ = now;
   return true;
+}
+
+// All that is kept in the odom frame, when that frame is another one: as at a start. Older poses would
+// bring scans that are still under way into a frame between the two.
+void Arbiter::forgetPlaces() {
+  history_.keepLatest();
+  envelope_.reset();
+  centerline_pose_.reset();
 }
 
 void Arbiter::setTruckState(const TruckState& state, Stamp now) {
@@ -139,7 +150,7 @@ void Arbiter::clockJumped() {
   }
   slots_ = {};
   history_.clear();
-  envelope_.reset();
+  forgetPlaces();
   yaw_.reset();
   scan_received_.reset();
   rejection_received_.reset();
@@ -148,7 +159,6 @@ void Arbiter::clockJumped() {
   tunnel_valid_received_.reset();
   motion_received_.reset();
   truck_state_received_.reset();
-  centerline_pose_.reset();
   corridor_stamp_.reset();
   free_ways_.clear();
   slow_until_.reset();

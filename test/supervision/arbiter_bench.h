@@ -43,6 +43,7 @@ struct ArbiterBench {
       if (narrow) {
         for (auto& p : scene.walls.left.curve) p.y() -= p.x() > *narrow ? 0.9 : 0.0;
       }
+      for (auto& p : scene.walls.left.curve) p.y() -= narrower;
       scene.tunnel.state.valid = tunnel_valid;
       if (!tunnel_valid) scene.tunnel.centerline = geometry::Path();
       arbiter->setPoints(scene.points, scene.walls.stamp, now);
@@ -88,6 +89,7 @@ struct ArbiterBench {
   double speed = 3.0;
   std::optional<double> obstacle;
   std::optional<double> narrow;  // the left wall stands nearer from here on
+  double narrower = 0.0;         // the whole of it does, by this [m]
 };
 
 }  // namespace tunnel_pilot::supervision

@@ -145,6 +145,113 @@ TEST(ArbiterEdge, ASpeedBeyondAllSenseDoesNotBlindTheCorridorForWhatComesAfterIt
   EXPECT_EQ(bench.cycles(5).command.reason, Reason::kObstacle);
 }
 
+// ---- odometry that jumps
+
+// What odometry tells of the truck from now on, as seen from where it was.
+void jump(ArbiterBench& bench, const geometry::Pose& by) {
+  bench.motion.pose = bench.motion.pose.compose(by);
+}
+
+const std::vector<geometry::Pose> kJumps = {{0.0, 1.5, 0.0},  {0.0, -1.2, 0.0}, {4.0, 0.0, 1.2},
+                                            {0.0, 0.0, -0.6}, {-3.0, 1.0, 3.1}, {1e5, 2e5, 1.0}};
+
+TEST(ArbiterEdge, AStandingTruckEngagesAfterAFalsePoseWithoutDriving) {
+  for (const geometry::Pose& by : kJumps) {
+    ArbiterBench bench;
+    bench.motion.speed = 0.0;
+    bench.cycles(20);
+    const geometry::Pose here = bench.motion.pose;
+    jump(bench, by);
+    bench.cycle();
+    bench.motion.pose = here;
+    EXPECT_EQ(bench.cycles(50).command.reason, Reason::kNotEngaged) << by.x << " " << by.y;
+    bench.state = {true, false, Reason::kNone};
+    EXPECT_EQ(bench.cycles(50).command.reason, Reason::kNone) << by.x << " " << by.y;
+    EXPECT_EQ(bench.arbiter->odometryJumps(), 2u);
+  }
+}
+
+TEST(ArbiterEdge, AFalsePoseTooNearToBeAJumpKeepsNoTruckFromEngaging) {
+  for (const geometry::Pose& by : {geometry::Pose{0.0, 0.24, 0.0}, geometry::Pose{0.0, 0.0, 0.095}}) {
+    ArbiterBench bench;
+    bench.motion.speed = 0.0;
+    bench.cycles(20);
+    const geometry::Pose here = bench.motion.pose;
+    jump(bench, by);
+    bench.cycles(10);
+    bench.motion.pose = here;
+    EXPECT_EQ(bench.cycles(50).command.reason, Reason::kNotEngaged) << by.y << " " << by.heading;
+    EXPECT_EQ(bench.arbiter->odometryJumps(), 0u);
+  }
+}
+
+TEST(ArbiterEdge, ATruckWhoseOdometryWasSetAnewEngagesWithoutDriving) {
+  for (const geometry::Pose& by : kJumps) {
+    ArbiterBench bench;
+    bench.cycles(300);  // 18 m
+    bench.motion.speed = 0.0;
+    bench.cycles(20);
+    jump(bench, by);
+    EXPECT_EQ(bench.cycles(50).command.reason, Reason::kNotEngaged) << by.x << " " << by.y;
+    EXPECT_EQ(bench.arbiter->odometryJumps(), 1u);
+  }
+}
+
+// Drives past a place where the left wall stands nearer, until that is beside the rear body.
+void passANarrowPlace(ArbiterBench& bench) {
+  bench.cycles(60);
+  bench.narrower = 0.5;
+  bench.cycles(20);
+  bench.narrower = 0.0;
+  bench.cycles(60);
+}
+
+constexpr double kRoom = 0.975;  // [m] beside a truck in the middle of the drift
+
+TEST(ArbiterEdge, AfterAJumpOnlyWhatIsSeenNowIsKnownAsAtAStart) {
+  ArbiterBench bench;
+  passANarrowPlace(bench);
+  ASSERT_NEAR(bench.cycle().clearance_left, kRoom - 0.5, 0.02) << "the wall that was passed";
+  jump(bench, {0.0, 0.0, 1.0});
+  EXPECT_NEAR(bench.cycles(3).clearance_left, kRoom, 0.02);
+}
+
+TEST(ArbiterEdge, AfterAJumpTheWallsAreRememberedAgainFromThereOn) {
+  ArbiterBench bench;
+  bench.cycles(20);
+  jump(bench, {50.0, 20.0, 0.0});
+  passANarrowPlace(bench);
+  EXPECT_NEAR(bench.cycle().clearance_left, kRoom - 0.5, 0.02);
+}
+
+TEST(ArbiterEdge, WithoutAJumpTheWallsPassedStayKnown) {
+  ArbiterBench bench;
+  bench.motion.speed = bench.speed = 7.0;
+  bench.cycles(20);
+  bench.narrower = 0.5;
+  bench.cycles(10);
+  bench.narrower = 0.0;
+  bench.cycles(20);
+  bench.give_scan = false;
+  bench.cycles(12);
+  bench.give_scan = true;
+  bench.give_motion = false;
+  bench.cycles(4);
+  bench.motion.pose.x += 4 * 7.0 * 0.02;
+  bench.give_motion = true;
+  EXPECT_NEAR(bench.cycle().clearance_left, kRoom - 0.5, 0.02);
+  EXPECT_EQ(bench.arbiter->odometryJumps(), 0u);
+}
+
+TEST(ArbiterEdge, AfterAJumpNoStopIsSteeredAlongACenterlineOfTheOldFrame) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.tunnel_valid = bench.proposal_valid = false;
+  ASSERT_EQ(bench.cycles(10).command.source, Source::kDeadReckoning);
+  jump(bench, {0.0, 0.0, 1.0});
+  EXPECT_EQ(bench.cycle().command.source, Source::kHold);
+}
+
 TEST(ArbiterEdge, MotionThatWasMeasuredLongAgoIsStale) {
   ArbiterBench bench;
   bench.drive();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <optional>
@@ -21,6 +22,7 @@ class MotionHistory {
   /// Allocation-free.
   bool add(const Motion& motion, Stamp now);
   void clear() { size_ = 0; }
+  void keepLatest() { size_ = std::min<std::size_t>(size_, 1); }  ///< forgets all before it
 
   bool empty() const { return size_ == 0; }
   const Motion& latest() const { return ring_[newest_]; }
@@ -44,5 +46,10 @@ geometry::Pose advanced(const geometry::Pose& pose, double speed, double yaw_rat
 /// True when every number is one, and of a magnitude of at most 1e6: a pose farther away than 1000 km
 /// resolves no nanometre any more, and squares of the largest numbers are none.
 bool isUsable(const Motion& motion);
+
+/// A truck can have come from the one pose to the other in the time between. If not, odometry was set
+/// anew or one of the two is false: what is known in the frame of the first means nothing in the
+/// second's.
+bool leadsTo(const Motion& before, const Motion& after);
 
 }  // namespace tunnel_pilot::drivers

@@ -116,8 +116,11 @@ class Arbiter {
   void setWalls(const perception::Walls& walls, Stamp now);
   void setTunnel(const perception::Tunnel& tunnel, Stamp now);
   /// False: it is refused, because it is not usable (drivers::isUsable), which stops the truck, or
-  /// because its stamp lies farther ahead of `now` than max_future.
+  /// because its stamp lies farther ahead of `now` than max_future. When the pose before cannot have
+  /// led to this one, the walls passed are forgotten, as at a start: the odom frame is another one.
   bool setMotion(const drivers::Motion& motion, Stamp now);
+  /// How often a pose came to which the one before cannot have led.
+  std::uint32_t odometryJumps() const { return odometry_jumps_; }
   void setTruckState(const TruckState& state, Stamp now);
 
   /// Returns of an accepted scan, in scan order, in base_link: any range of points with x and y members
@@ -182,6 +185,7 @@ class Arbiter {
   };
 
   void takeScan(Stamp stamp, Stamp now);
+  void forgetPlaces();
   void watchClock(Stamp now);
   Health health(const SourceRule& rule, Stamp now) const;
   bool engaged() const;
@@ -240,6 +244,7 @@ class Arbiter {
   std::optional<Stamp> tunnel_received_, tunnel_valid_received_;
   std::optional<Stamp> motion_received_;
   bool motion_usable_ = true;
+  std::uint32_t odometry_jumps_ = 0;
   TruckState truck_state_;
   std::optional<Stamp> truck_state_received_;
   bool standby_seen_ = false;  ///< the truck was neither engaged nor stopping once
