@@ -192,7 +192,6 @@ void CanBridge::clockJumped(Stamp now) {
   if (command_) command_->command.stamp = command_->at = Stamp::min() / 2;  // stale in any clock
   link_healthy_since_.reset();
   healthy_since_.reset();
-  undegraded_since_.reset();
   standing_since_.reset();
   entered_ = last_tick_ = now;
   watch_.reset(link_.feedback().articulation_angle, now);
@@ -271,7 +270,6 @@ void CanBridge::raise(Event event, Stamp now, Reason carried) {
   status_.state = row->to;
   ++status_.transitions;
   entered_ = now;
-  undegraded_since_.reset();
   held_angle_.reset();
   if (event == Event::kCommandReady) obeyed_ = now;  // the truck's time to obey begins
 }
@@ -328,10 +326,7 @@ void CanBridge::watchInputs(Stamp now) {
   const std::optional<Event> any = anyFault(now);
   follow(link_healthy_since_, !link, now);
   follow(healthy_since_, !any, now);
-  if (any) raise(*any, now);
-  // A fault of the truck may hide the others; each alone must stop.
-  if (silent_process_) raise(Event::kProcessSilent, now);
-  if (const auto fault = commandFault(now)) raise(*fault, now);
+  if (any) raise(*any, now);  // any one ends driving, whichever it hides (TransitionTable's test)
   if (drives(status_.state)) {
     if (const auto fault = drivingFault(now)) raise(*fault, now);
   }

@@ -6,6 +6,7 @@
 #include <regex>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include "tunnel_pilot/bridge/safety_state.h"
 #include "tunnel_pilot/can/codec.h"
@@ -172,6 +173,39 @@ TEST(TransitionTable, StopsAreLeftOnlyByStandstillAndTheOperatorsReset) {
     EXPECT_TRUE(stopping == nullptr || stopping->to == SafetyState::kStopped) << toString(event);
     const Transition* stopped = findTransition(SafetyState::kStopped, event);
     EXPECT_EQ(stopped != nullptr, event == Event::kOperatorReset);
+  }
+}
+
+// CanBridge looks for the gravest fault alone: what it hides must make no difference.
+TEST(TransitionTable, EveryFaultLeavesArmedActiveAndDegraded) {
+  for (const Event fault :
+       {Event::kBusFault, Event::kForeignSender, Event::kFeedbackCorrupt, Event::kFeedbackStale,
+        Event::kOperatorOverride, Event::kKeyTurned, Event::kTruckFault, Event::kProcessSilent,
+        Event::kCommandStale, Event::kMeasurementStale}) {
+    for (const SafetyState state : {SafetyState::kArmed, SafetyState::kActive, SafetyState::kDegraded}) {
+      const Transition* row = findTransition(state, fault);
+      ASSERT_NE(row, nullptr) << toString(state) << ", " << toString(fault);
+      EXPECT_FALSE(isEngaged(row->to)) << toString(state) << ", " << toString(fault);
+    }
+  }
+}
+
+TEST(TransitionTable, ASilentProcessAndAnOldCommandChangeNoOtherState) {
+  for (const Event fault : {Event::kProcessSilent, Event::kCommandStale, Event::kMeasurementStale}) {
+    for (const SafetyState state :
+         {SafetyState::kInit, SafetyState::kStandby, SafetyState::kStopping, SafetyState::kStopped}) {
+      EXPECT_EQ(findTransition(state, fault), nullptr) << toString(state) << ", " << toString(fault);
+    }
+  }
+}
+
+// CanBridge counts the time of recovery while it drives, and begins anew with what leads into DEGRADED.
+TEST(TransitionTable, OnlyWhatDegradesLeadsIntoDegradedAndOnlyFromThereOneRecovers) {
+  for (const Transition& row : transitionTable()) {
+    const bool degrades = row.event == Event::kDegradeAsked || row.event == Event::kMeasurementLate;
+    EXPECT_EQ(row.to == SafetyState::kDegraded, degrades) << toString(row.event);
+    if (row.event != Event::kRecovered) continue;
+    EXPECT_EQ(row.from, std::vector{SafetyState::kDegraded});
   }
 }
 

@@ -161,8 +161,8 @@ class CanBridge {
   std::optional<Stamp> asked_to_discard_;  ///< since the bus last worked
   std::uint64_t confirmed_in_fault_ = 0;   ///< frames, when the bus last failed
   std::optional<Stamp> link_healthy_since_;
-  std::optional<Stamp> healthy_since_;  ///< all inputs
-  std::optional<Stamp> undegraded_since_;
+  std::optional<Stamp> healthy_since_;     ///< all inputs
+  std::optional<Stamp> undegraded_since_;  ///< what leads into DEGRADED ends it
   Stamp obeyed_{};  ///< when the truck last told that it obeys, or was first asked to
   std::optional<Stamp> standing_since_;
   std::optional<double> held_angle_;  ///< of a stop without a usable command [rad]
