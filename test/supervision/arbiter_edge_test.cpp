@@ -121,6 +121,17 @@ TEST(ArbiterEdge, MotionThatNeverWasANumberIsNotWaitedFor) {
   EXPECT_EQ(bench.cycle().command.reason, Reason::kMotionStale);
 }
 
+TEST(ArbiterEdge, MotionIsTakenAlsoWhenItTellsNothingNewUnlessItIsNone) {
+  ArbiterBench bench;
+  bench.cycles(5);
+  drivers::Motion motion = bench.motion;
+  motion.stamp += milliseconds(10);
+  EXPECT_TRUE(bench.arbiter->setMotion(motion, bench.now));
+  EXPECT_TRUE(bench.arbiter->setMotion(motion, bench.now)) << "once more";
+  motion.speed = kNaN;
+  EXPECT_FALSE(bench.arbiter->setMotion(motion, bench.now));
+}
+
 TEST(ArbiterEdge, MotionFromBeyondAMillionIsRefusedAndStopsInTheSameCycle) {
   for (const bool pose : {true, false}) {
     ArbiterBench bench;
