@@ -232,6 +232,13 @@ TEST(ArbiterEdge, AfterAJumpOnlyWhatIsSeenNowIsKnownAsAtAStart) {
   EXPECT_NEAR(bench.cycles(3).clearance_left, kRoom, 0.02);
 }
 
+TEST(ArbiterEdge, AfterAClockJumpOnlyWhatIsSeenNowIsKnown) {
+  ArbiterBench bench;
+  passANarrowPlace(bench);
+  bench.arbiter->clockJumped();
+  EXPECT_NEAR(bench.cycles(3).clearance_left, kRoom, 0.02);
+}
+
 TEST(ArbiterEdge, AfterAJumpTheWallsAreRememberedAgainFromThereOn) {
   ArbiterBench bench;
   bench.cycles(20);
