@@ -18,9 +18,8 @@ on the bus ([can.md](can.md), "What the bridge sends"): the next tick has news, 
 
 ## Runs
 
-Seeds 24, 25 and 26, with the same programs: 100,006, 100,001 and 100,002 injections, no unsafe frame. In the run of seed 26 the truck stood for half of the time: where it cannot
-go on from, the campaign moves it back without its wheels turning, and the walls that the arbiter remembers beside it came along
-("too little clearance to a wall").
+Seeds 28 and 29, with the stages in one thread: 100,002 and 100,000 injections, no unsafe frame (seed 29 also with an arbiter that forgets the
+walls passed when odometry jumps: the truck came to drive 1,225 times, not 788 to 1,006). Seeds 24, 25 and 26, before: 100,006, 100,001 and 100,002, none.
 
 ## What runs found
 
