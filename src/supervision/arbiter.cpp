@@ -59,28 +59,28 @@ Arbiter::Arbiter(const ArbiterParameters& parameters, const vehicle::TruckParame
 // ---- inputs
 
 void Arbiter::setProposal(Source source, const drivers::Proposal& proposal, Stamp now) {
-  slots_.at(static_cast<std::size_t>(source)) = {proposal, now};
+  seen_.slots.at(static_cast<std::size_t>(source)) = {proposal, now};
 }
 
 void Arbiter::setRejection(const ScanRejection& rejection, Stamp now) {
   rejection_ = rejection;
-  rejection_received_ = now;
+  seen_.rejection_received = now;
 }
 
 void Arbiter::setWalls(const perception::Walls& walls, Stamp) { walls_ = walls; }
 
 void Arbiter::takeScan(Stamp stamp, Stamp now) {
-  if (age(scan_received_, now) > parameters_.scan_degraded_age) gap_ended_ = now;
+  if (age(seen_.scan_received, now) > parameters_.scan_degraded_age) seen_.gap_ended = now;
   points_stamp_ = stamp;
-  scan_received_ = now;
+  seen_.scan_received = now;
 }
 
 void Arbiter::setTunnel(const perception::Tunnel& tunnel, Stamp now) {
   tunnel_state_ = tunnel.state;
-  tunnel_received_ = now;
+  seen_.tunnel_received = now;
   if (!tunnel.state.valid || tunnel.centerline.empty()) return;
   const std::optional<geometry::Pose> pose = history_.poseAt(tunnel.state.stamp);
-  tunnel_valid_received_ = now;
+  seen_.tunnel_valid_received = now;
   centerline_ = tunnel.centerline;
   centerline_pose_ = pose;
   profile_.build(centerline_, truck_.geometry, kProfileSpacing);
@@ -96,7 +96,7 @@ bool Arbiter::setMotion(const drivers::Motion& motion, Stamp now) {
   if (jumped) forgetPlaces();
   odometry_jumps_ += jumped ? 1 : 0;
   if (motion.stamp > last) yaw_.update(motion, toSeconds(motion.stamp - last));
-  motion_received_ = now;
+  seen_.motion_received = now;
   return true;
 }
 
@@ -110,7 +110,7 @@ void Arbiter::forgetPlaces() {
 
 void Arbiter::setTruckState(const TruckState& state, Stamp now) {
   truck_state_ = state;
-  truck_state_received_ = now;
+  seen_.truck_state_received = now;
   const bool at_rest = !state.engaged && !state.stopping;
   standby_seen_ = standby_seen_ || at_rest;
   if (at_rest && latched_ && age(latched_at_, now) > parameters_.recovery_time) latched_.reset();
@@ -127,7 +127,7 @@ bool Arbiter::selectDriver(Source driver) {
     const bool left_out = rule.source == Source::kLidarDriver && driver == Source::kPreviewDriver;
     if (!left_out) parameters_.sources.push_back(rule);
   }
-  disagree_since_.reset();
+  seen_.disagree_since.reset();
   return true;
 }
 
@@ -148,27 +148,11 @@ void Arbiter::clockJumped() {
     latched_ = Reason::kClockJump;
     latched_at_.reset();
   }
-  slots_ = {};
+  seen_ = {};
   history_.clear();
   forgetPlaces();
   yaw_.reset();
-  scan_received_.reset();
-  rejection_received_.reset();
-  gap_ended_.reset();
-  tunnel_received_.reset();
-  tunnel_valid_received_.reset();
-  motion_received_.reset();
-  truck_state_received_.reset();
-  corridor_stamp_.reset();
   free_ways_.clear();
-  slow_until_.reset();
-  wait_until_.reset();
-  disagree_since_.reset();
-  last_hit_.reset();
-  last_.reset();
-  hits_ = 0;
-  obstructed_scans_ = 0;
-  obstacle_scans_ = 0;
 }
 
 // ---- findings
@@ -176,7 +160,7 @@ void Arbiter::clockJumped() {
 bool Arbiter::engaged() const { return !parameters_.needs_truck_state || truck_state_.engaged; }
 
 Arbiter::Health Arbiter::health(const SourceRule& rule, Stamp now) const {
-  const Slot& slot = slots_[static_cast<std::size_t>(rule.source)];
+  const Slot& slot = seen_.slots[static_cast<std::size_t>(rule.source)];
   if (!slot.received) return Health::kNever;
   const double stamp_age = toSeconds(now - slot.proposal.stamp);
   if (age(slot.received, now) > rule.max_age || stamp_age > parameters_.max_stamp_age) {
@@ -200,7 +184,7 @@ const SourceRule* Arbiter::bestSource(Stamp now) const {
 const drivers::Proposal* Arbiter::healthyProposal(Source source, Stamp now) const {
   for (const SourceRule& rule : parameters_.sources) {
     if (rule.source != source || health(rule, now) != Health::kHealthy) continue;
-    return &slots_[static_cast<std::size_t>(source)].proposal;
+    return &seen_.slots[static_cast<std::size_t>(source)].proposal;
   }
   return nullptr;
 }
@@ -213,55 +197,55 @@ void Arbiter::compareDrivers(Stamp now) {
       lidar && preview &&
       std::abs(lidar->articulation_angle - preview->articulation_angle) > parameters_.disagreement_angle;
   if (!disagree) {
-    disagree_since_.reset();
-  } else if (!disagree_since_) {
-    disagree_since_ = now;
+    seen_.disagree_since.reset();
+  } else if (!seen_.disagree_since) {
+    seen_.disagree_since = now;
   }
 }
 
 // No scan was accepted lately: do any come at all? Bad ones may come more seldom than good ones.
 Reason Arbiter::whyNoScan(Stamp now) const {
-  const bool accepted = age(scan_received_, now) <= parameters_.scan_degraded_age;
-  const bool come = age(rejection_received_, now) <= 2.0 * parameters_.scan_degraded_age;
+  const bool accepted = age(seen_.scan_received, now) <= parameters_.scan_degraded_age;
+  const bool come = age(seen_.rejection_received, now) <= 2.0 * parameters_.scan_degraded_age;
   if (accepted || !come) return Reason::kScanStale;
   return rejection_.frozen ? Reason::kScanFrozen : Reason::kScanRejected;
 }
 
 void Arbiter::assessScan(Stamp now, Findings& findings) const {
-  if (!scan_received_) return findings.stopFor(Reason::kStartUp);
-  const double received = age(scan_received_, now);
+  if (!seen_.scan_received) return findings.stopFor(Reason::kStartUp);
+  const double received = age(seen_.scan_received, now);
   const double oldest = std::max(received, toSeconds(now - points_stamp_));
   if (oldest > parameters_.scan_stop_age) findings.stopFor(whyNoScan(now));
   if (received > parameters_.scan_degraded_age) findings.slowFor(whyNoScan(now));
   if (!parameters_.wall_checks) return;
-  if (!corridor_stamp_) return findings.stopFor(Reason::kStartUp);
-  if (toSeconds(now - *corridor_stamp_) > parameters_.scan_stop_age) {
+  if (!seen_.corridor_stamp) return findings.stopFor(Reason::kStartUp);
+  if (toSeconds(now - *seen_.corridor_stamp) > parameters_.scan_stop_age) {
     findings.stopFor(whyNoScan(now));
   }
 }
 
 void Arbiter::assessTunnel(Stamp now, Findings& findings) const {
-  if (!tunnel_received_) return findings.stopFor(Reason::kStartUp);
-  const double without = age(tunnel_valid_received_, now);
+  if (!seen_.tunnel_received) return findings.stopFor(Reason::kStartUp);
+  const double without = age(seen_.tunnel_valid_received, now);
   if (without > parameters_.tunnel_grace) findings.stopFor(Reason::kTunnelInvalid);
   if (without > parameters_.scan_degraded_age) findings.slowFor(Reason::kTunnelInvalid);
 }
 
 bool Arbiter::motionHealthy(Stamp now) const {
   return motion_usable_ && !history_.empty() &&
-         age(motion_received_, now) <= parameters_.motion_stop_age &&
+         age(seen_.motion_received, now) <= parameters_.motion_stop_age &&
          toSeconds(now - history_.latest().stamp) <= parameters_.max_stamp_age;
 }
 
 void Arbiter::assessMotion(Stamp now, Findings& findings) const {
-  if (!motion_received_ && motion_usable_) return findings.stopFor(Reason::kStartUp);
+  if (!seen_.motion_received && motion_usable_) return findings.stopFor(Reason::kStartUp);
   if (!motionHealthy(now)) findings.stopFor(Reason::kMotionStale);
   if (steering_monitor_.failed()) findings.stopFor(Reason::kTrackingError);
 }
 
 void Arbiter::assessTruck(Stamp now, Findings& findings) const {
   if (!parameters_.needs_truck_state) return;
-  if (!truck_state_received_) return findings.stopFor(Reason::kStartUp);
+  if (!seen_.truck_state_received) return findings.stopFor(Reason::kStartUp);
   // An arbiter that comes up behind a truck already under way has not seen it engage.
   if (truck_state_.engaged && !standby_seen_) findings.stopFor(Reason::kStartUp);
   if (truck_state_.stopping) {
@@ -269,16 +253,17 @@ void Arbiter::assessTruck(Stamp now, Findings& findings) const {
     const bool known = gravity(truck_state_.reason) > 0;
     findings.stopFor(known ? truck_state_.reason : Reason::kTruckFault);
   }
-  if (age(truck_state_received_, now) > parameters_.truck_state_stop_age) {
+  if (age(seen_.truck_state_received, now) > parameters_.truck_state_stop_age) {
     findings.stopFor(Reason::kFeedbackStale);
   }
 }
 
 // A scan is late, or came late and has still to become this source's proposal.
 bool Arbiter::waitsForScan(const SourceRule& rule, Stamp now) const {
-  if (age(scan_received_, now) > parameters_.scan_degraded_age) return true;
-  const Stamp measured = slots_[static_cast<std::size_t>(rule.source)].proposal.stamp;
-  return age(gap_ended_, now) <= rule.max_age && toSeconds(now - measured) <= parameters_.scan_stop_age;
+  if (age(seen_.scan_received, now) > parameters_.scan_degraded_age) return true;
+  const Stamp measured = seen_.slots[static_cast<std::size_t>(rule.source)].proposal.stamp;
+  return age(seen_.gap_ended, now) <= rule.max_age &&
+         toSeconds(now - measured) <= parameters_.scan_stop_age;
 }
 
 // Without a healthy source the truck stops, unless what the sources lack is about to be judged by
@@ -289,7 +274,7 @@ void Arbiter::assessSources(Stamp now, Findings& findings) const {
                                              Reason::kProposalInvalid, Reason::kNoSource,
                                              Reason::kLowConfidence};
   if (bestSource(now)) return;
-  const bool tunnel_lost = tunnel_received_ && !tunnel_state_.valid;
+  const bool tunnel_lost = seen_.tunnel_received && !tunnel_state_.valid;
   Findings causes;
   bool excused = false;
   for (const SourceRule& rule : parameters_.sources) {
@@ -313,7 +298,7 @@ void Arbiter::assessConfidence(Stamp now, Findings& findings) const {
         state == Health::kUnsure || (state == Health::kUnable && rule.min_confidence > 0.0);
     if (before_best && unsure) findings.slowFor(Reason::kLowConfidence);
   }
-  if (disagree_since_ && age(disagree_since_, now) >= parameters_.disagreement_time) {
+  if (seen_.disagree_since && age(seen_.disagree_since, now) >= parameters_.disagreement_time) {
     findings.slowFor(Reason::kDriversDisagree);
   }
 }
@@ -326,9 +311,9 @@ Arbiter::Findings Arbiter::assess(Stamp now) const {
   assessTruck(now, findings);
   assessSources(now, findings);
   assessConfidence(now, findings);
-  if (obstacle_scans_ >= parameters_.obstacle_scans) findings.stopFor(Reason::kObstacle);
-  if (obstructed_scans_ >= parameters_.wall_scans) findings.stopFor(obstruction_);
-  if (hits_ >= parameters_.limit_hits) findings.slowFor(Reason::kLimitsHit);
+  if (seen_.obstacle_scans >= parameters_.obstacle_scans) findings.stopFor(Reason::kObstacle);
+  if (seen_.obstructed_scans >= parameters_.wall_scans) findings.stopFor(obstruction_);
+  if (seen_.hits >= parameters_.limit_hits) findings.slowFor(Reason::kLimitsHit);
   return findings;
 }
 
@@ -336,7 +321,7 @@ Arbiter::Findings Arbiter::assess(Stamp now) const {
 
 Arbiter::Steering Arbiter::chooseSteering(Stamp now) const {
   if (const SourceRule* best = bestSource(now)) {
-    const drivers::Proposal& proposal = slots_[static_cast<std::size_t>(best->source)].proposal;
+    const drivers::Proposal& proposal = seen_.slots[static_cast<std::size_t>(best->source)].proposal;
     return {best->source, proposal.articulation_angle, proposal.stamp};
   }
   if (const std::optional<Steering> reckoned = deadReckoning(now)) return *reckoned;
@@ -353,7 +338,7 @@ std::optional<geometry::Pose> Arbiter::placeInCenterline(Stamp now) const {
 
 // Along the last measured centerline; the law looks ahead by the steering's own delay.
 std::optional<Arbiter::Steering> Arbiter::deadReckoning(Stamp now) const {
-  if (!motionHealthy(now) || age(tunnel_valid_received_, now) > parameters_.dead_reckoning_age) {
+  if (!motionHealthy(now) || age(seen_.tunnel_valid_received, now) > parameters_.dead_reckoning_age) {
     return std::nullopt;
   }
   const std::optional<geometry::Pose> here = placeInCenterline(now);
@@ -381,7 +366,7 @@ Arbiter::Speed Arbiter::chooseSpeed(Stamp now) {
       take(governor_.stoppingWithin(centerline_.points().back().s - s), SpeedLimit::kSight);
     }
   }
-  if (corridor_stamp_) {
+  if (seen_.corridor_stamp) {
     const FreeWay free = freeWay();
     const bool blocked = free.until != Envelope::End::kSight;
     take(governor_.stoppingWithin(free.distance), blocked ? SpeedLimit::kObstacle : SpeedLimit::kSight);
@@ -389,7 +374,7 @@ Arbiter::Speed Arbiter::chooseSpeed(Stamp now) {
   decision_.speed_limit = lowest.value;
   for (const SourceRule& rule : parameters_.sources) {
     if (!rule.gives_speed || health(rule, now) != Health::kHealthy) continue;
-    const double speed = slots_[static_cast<std::size_t>(rule.source)].proposal.speed;
+    const double speed = seen_.slots[static_cast<std::size_t>(rule.source)].proposal.speed;
     if (speed < lowest.value) lowest = {speed, rule.source, SpeedLimit::kDriver};
   }
   return lowest;
@@ -410,20 +395,20 @@ Arbiter::FreeWay Arbiter::freeWay() const {
 // eats up the free distance.
 void Arbiter::updateCorridor(double commanded, Stamp now) {
   if (!parameters_.wall_checks || history_.empty()) return;
-  const bool complete = scan_received_ && tunnel_received_ && walls_.stamp == points_stamp_ &&
+  const bool complete = seen_.scan_received && seen_.tunnel_received && walls_.stamp == points_stamp_ &&
                         tunnel_state_.stamp == points_stamp_;
-  const bool fresh = !corridor_stamp_ || *corridor_stamp_ != points_stamp_;
+  const bool fresh = !seen_.corridor_stamp || *seen_.corridor_stamp != points_stamp_;
   const drivers::Motion& motion = history_.latest();
   const std::optional<geometry::Pose> scan_pose = history_.poseAt(points_stamp_);
   const std::optional<geometry::Pose> here = history_.poseAt(now);
-  for (FreeWay& free : free_ways_) free.distance -= std::abs(motion.speed) * age(last_, now);
+  for (FreeWay& free : free_ways_) free.distance -= std::abs(motion.speed) * age(seen_.last, now);
   if (!complete || !fresh || !scan_pose || !here) return;
   const geometry::Pose path_frame =
       centerline_pose_ ? scan_pose->relative(*centerline_pose_) : geometry::Pose{};
   envelope_.update({walls_, points_, centerline_, centerline_pose_ ? profile_ : no_profile_, path_frame,
                     scan_pose->relative(*here), *scan_pose, motion.articulation, commanded,
                     std::abs(motion.speed), yaw_.response(), slip_compliance_});
-  corridor_stamp_ = points_stamp_;
+  seen_.corridor_stamp = points_stamp_;
   const Envelope::Result& result = envelope_.result();
   free_ways_.push_back({result.free_distance, result.free_until});
   if (free_ways_.size() > static_cast<std::size_t>(parameters_.obstacle_scans)) {
@@ -433,14 +418,14 @@ void Arbiter::updateCorridor(double commanded, Stamp now) {
       envelope_.stoppingDistance(std::abs(motion.speed)) + parameters_.envelope.reserve;
   const bool obstructed = result.free_until != Envelope::End::kSight && result.free_distance < needed;
   const bool by_wall = result.free_until == Envelope::End::kWall;
-  obstructed_scans_ = obstructed ? obstructed_scans_ + 1 : 0;
-  obstacle_scans_ = obstructed && !by_wall ? obstacle_scans_ + 1 : 0;
+  seen_.obstructed_scans = obstructed ? seen_.obstructed_scans + 1 : 0;
+  seen_.obstacle_scans = obstructed && !by_wall ? seen_.obstacle_scans + 1 : 0;
   obstruction_ = by_wall ? Reason::kClearance : Reason::kObstacle;
 }
 
 void Arbiter::tellCorridor() {
   const double unknown = std::numeric_limits<double>::quiet_NaN();
-  const bool known = corridor_stamp_.has_value();
+  const bool known = seen_.corridor_stamp.has_value();
   const Envelope::Result& result = envelope_.result();
   decision_.clearance_left = known ? result.clearance_left : unknown;
   decision_.clearance_right = known ? result.clearance_right : unknown;
@@ -454,8 +439,8 @@ void Arbiter::tellCorridor() {
 // ---- the decision
 
 void Arbiter::watchClock(Stamp now) {
-  if (!last_) return;
-  const double step = toSeconds(now - *last_);
+  if (!seen_.last) return;
+  const double step = toSeconds(now - *seen_.last);
   if (step < 0.0 || step > parameters_.clock_jump) clockJumped();
 }
 
@@ -477,25 +462,25 @@ Arbiter::Speed Arbiter::waitForFreeWay(const Speed& speed, Stamp now) {
   const bool stands = !history_.empty() && std::abs(history_.latest().speed) < kStanding;
   if (blocked && stands && speed.value < kStanding) {
     waits_for_ = speed.by;
-    wait_until_ = now + fromSeconds(parameters_.recovery_time);
+    seen_.wait_until = now + fromSeconds(parameters_.recovery_time);
   }
-  if (!wait_until_ || *wait_until_ <= now) return speed;
+  if (!seen_.wait_until || *seen_.wait_until <= now) return speed;
   return {0.0, Source::kNone, waits_for_};
 }
 
 bool Arbiter::slowNow(Reason found, Stamp now) {
   if (found != Reason::kNone) {
     slow_reason_ = found;
-    slow_until_ = now + fromSeconds(parameters_.recovery_time);
+    seen_.slow_until = now + fromSeconds(parameters_.recovery_time);
   }
-  return slow_until_ && *slow_until_ > now;
+  return seen_.slow_until && *seen_.slow_until > now;
 }
 
 void Arbiter::watchLimits(const CommandLimiter::Flags& fired, Stamp now) {
-  if (age(last_hit_, now) > parameters_.recovery_time) hits_ = 0;
+  if (age(seen_.last_hit, now) > parameters_.recovery_time) seen_.hits = 0;
   if (!(fired.angle || fired.lateral_acceleration) || !engaged()) return;
-  ++hits_;
-  last_hit_ = now;
+  ++seen_.hits;
+  seen_.last_hit = now;
 }
 
 const Decision& Arbiter::decide(Stamp now) {
@@ -515,7 +500,7 @@ const Decision& Arbiter::decide(Stamp now) {
   letOut(steering, speed, stop, now);
   decision_.command.reason = reasonOf(findings.stop, speed);
   tellCorridor();
-  last_ = now;
+  seen_.last = now;
   return decision_;
 }
 
@@ -538,7 +523,7 @@ void Arbiter::letOut(const Steering& steering, const Speed& speed, bool stop, St
     steering_monitor_.start(measured, now);
     started_ = !history_.empty();
   }
-  const double elapsed = last_ ? toSeconds(now - *last_) : 0.0;
+  const double elapsed = seen_.last ? toSeconds(now - *seen_.last) : 0.0;
   const CommandLimiter::Result result =
       limiter_.limit({steering.articulation, speed.value, measured_speed, stop}, elapsed);
   if (obeyed && motionHealthy(now)) {

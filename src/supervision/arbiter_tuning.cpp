@@ -50,8 +50,8 @@ void Arbiter::tune(const std::vector<double>& values) {
 }
 
 bool Arbiter::mayLoosen(Stamp now) const {
-  if (!parameters_.needs_truck_state || !truck_state_received_) return false;
-  const double silence = toSeconds(now - *truck_state_received_);
+  if (!parameters_.needs_truck_state || !seen_.truck_state_received) return false;
+  const double silence = toSeconds(now - *seen_.truck_state_received);
   return silence <= parameters_.truck_state_stop_age && !truck_state_.engaged && !truck_state_.stopping;
 }
 

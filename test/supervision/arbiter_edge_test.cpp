@@ -424,6 +424,18 @@ TEST(ArbiterEdge, ATruckSeenToTurnLessThanItsHingeIsExpectedToGoWider) {
   EXPECT_LT(endOfCorridor(0.8), endOfCorridor(1.0) - 0.05);
 }
 
+TEST(ArbiterEdge, AfterAClockJumpTheTruckTurnsAsItsHingeSaysUntilSeenOtherwise) {
+  ArbiterBench bench;
+  bench.wanted = bench.motion.articulation = 0.2;
+  const double whole = vehicle::yawRate(bench.truck.geometry, 3.0, 0.2, 0.0);
+  bench.motion.yaw_rate = 0.8 * whole;
+  bench.drive();
+  bench.cycles(100);
+  bench.arbiter->clockJumped();
+  bench.motion.yaw_rate = whole;
+  EXPECT_NEAR(bench.cycles(3).corridor_left.back().y(), endOfCorridor(1.0), 0.01);
+}
+
 TEST(ArbiterEdge, AHeldArticulationIsOfTheTimeOfTheLastMotionAndWithoutAnyOfNone) {
   ArbiterBench bench;
   EXPECT_EQ(bench.arbiter->decide(bench.now).command.stamp, Stamp{});

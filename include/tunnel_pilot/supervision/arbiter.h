@@ -184,6 +184,25 @@ class Arbiter {
     void slowFor(Reason reason);
   };
 
+  /// What was seen, and when by the clock: forgotten when it jumps.
+  struct Seen {
+    std::array<Slot, 9> slots;  ///< by Source
+    std::optional<Stamp> scan_received, rejection_received;
+    std::optional<Stamp> gap_ended;  ///< when the last scan that was late came
+    std::optional<Stamp> tunnel_received, tunnel_valid_received;
+    std::optional<Stamp> motion_received;
+    std::optional<Stamp> truck_state_received;
+    std::optional<Stamp> disagree_since;  ///< lidar and preview driver
+    std::optional<Stamp> corridor_stamp;  ///< of the scan last compared
+    int obstructed_scans = 0;             ///< one after the other, by obstacle or wall
+    int obstacle_scans = 0;               ///< ... by an obstacle
+    std::optional<Stamp> last;            ///< decision
+    std::optional<Stamp> slow_until;
+    std::optional<Stamp> wait_until;
+    int hits = 0;  ///< of the limits
+    std::optional<Stamp> last_hit;
+  };
+
   void takeScan(Stamp stamp, Stamp now);
   void forgetPlaces();
   void watchClock(Stamp now);
@@ -227,8 +246,7 @@ class Arbiter {
   SteeringMonitor steering_monitor_;
   drivers::MotionHistory history_;
 
-  std::array<Slot, 9> slots_;            ///< by Source
-  std::optional<Stamp> disagree_since_;  ///< lidar and preview driver
+  Seen seen_;
   perception::Walls walls_;
   std::vector<geometry::Point> points_;
   perception::TunnelState tunnel_state_;  ///< newest
@@ -237,35 +255,21 @@ class Arbiter {
   drivers::ArticulationProfile no_profile_;
   std::optional<geometry::Pose> centerline_pose_;  ///< its frame in odom
   Stamp points_stamp_{};
-  std::optional<Stamp> scan_received_;
   ScanRejection rejection_;  ///< the last
-  std::optional<Stamp> rejection_received_;
-  std::optional<Stamp> gap_ended_;  // when the last scan that was late came
-  std::optional<Stamp> tunnel_received_, tunnel_valid_received_;
-  std::optional<Stamp> motion_received_;
   bool motion_usable_ = true;
   std::uint32_t odometry_jumps_ = 0;
   TruckState truck_state_;
-  std::optional<Stamp> truck_state_received_;
   bool standby_seen_ = false;  ///< the truck was neither engaged nor stopping once
 
-  std::optional<Stamp> corridor_stamp_;  ///< of the scan last compared
   std::vector<FreeWay> free_ways_;  ///< of the last obstacle_scans scans, less what was driven since
-  int obstructed_scans_ = 0;        ///< one after the other, by obstacle or wall
-  int obstacle_scans_ = 0;          ///< ... by an obstacle
   Reason obstruction_ = Reason::kObstacle;
 
   Decision decision_;
-  std::optional<Stamp> last_;  ///< decision
-  bool started_ = false;       ///< the limiter knows where the articulation stands
+  bool started_ = false;  ///< the limiter knows where the articulation stands
   std::optional<Reason> latched_;
   std::optional<Stamp> latched_at_;
   Reason slow_reason_ = Reason::kNone;
-  std::optional<Stamp> slow_until_;
   SpeedLimit waits_for_ = SpeedLimit::kNone;  ///< what the truck stands before
-  std::optional<Stamp> wait_until_;
-  int hits_ = 0;
-  std::optional<Stamp> last_hit_;
 };
 
 }  // namespace tunnel_pilot::supervision
