@@ -424,6 +424,18 @@ TEST(ArbiterEdge, ATruckSeenToTurnLessThanItsHingeIsExpectedToGoWider) {
   EXPECT_LT(endOfCorridor(0.8), endOfCorridor(1.0) - 0.05);
 }
 
+TEST(ArbiterEdge, AfterAClockJumpTheFirstScanAloneSaysHowFarTheWayIsFree) {
+  ArbiterBench bench;
+  bench.cycles(5);
+  bench.obstacle = 6.0;
+  ASSERT_GT(bench.cycle().free_distance, 6.0) << "one scan alone shortens nothing";
+  bench.obstacle.reset();
+  bench.cycles(5);
+  bench.arbiter->clockJumped();
+  bench.obstacle = 6.0;
+  EXPECT_LT(bench.cycle().free_distance, 6.0);
+}
+
 TEST(ArbiterEdge, AfterAClockJumpTheTruckTurnsAsItsHingeSaysUntilSeenOtherwise) {
   ArbiterBench bench;
   bench.wanted = bench.motion.articulation = 0.2;
