@@ -508,6 +508,15 @@ TEST(ArbiterEdge, WhereTheTruckHasNoStatesStartingUpIsNoLatchedStop) {
   EXPECT_EQ(bench.cycles(10).command.reason, Reason::kNone);
 }
 
+TEST(ArbiterEdge, WhereTheTruckHasNoStatesAStopStaysTooWhenItsCauseIsGone) {
+  ArbiterBench bench(false);
+  bench.drive();
+  bench.give_scan = false;
+  ASSERT_EQ(bench.cycles(30).command.reason, Reason::kScanStale);
+  bench.give_scan = true;
+  EXPECT_EQ(bench.cycles(100).command.reason, Reason::kScanStale);
+}
+
 TEST(ArbiterEdge, BeforeAnyMotionAResetIsRefused) {
   ArbiterBench bench(false);
   EXPECT_FALSE(bench.arbiter->reset(bench.now));
@@ -609,6 +618,19 @@ TEST(ArbiterEdge, WithoutWallChecksTheEndOfTheCenterlineLimitsTheSpeed) {
   EXPECT_EQ(decision.limited_by, SpeedLimit::kSight);
   EXPECT_TRUE(std::isnan(decision.clearance_left));
   EXPECT_TRUE(std::isnan(decision.free_distance));
+}
+
+TEST(ArbiterEdge, WithoutWallChecksTheWayDrivenBringsTheEndOfTheCenterlineNearer) {
+  ArbiterBench bench;
+  bench.parameters.wall_checks = false;
+  startAnew(bench);
+  bench.speed = 9.0;
+  bench.drive();
+  const double before = bench.cycles(200).command.speed;
+  bench.give_scan = false;
+  const Decision& decision = bench.cycles(4);
+  EXPECT_EQ(decision.limited_by, SpeedLimit::kSight);
+  EXPECT_LT(decision.command.speed, before);
 }
 
 TEST(ArbiterEdge, ADegradedDriveIsNoFasterThanItsDriverWants) {
