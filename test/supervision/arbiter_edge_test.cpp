@@ -626,7 +626,7 @@ TEST(ArbiterEdge, WithoutWallChecksTheWayDrivenBringsTheEndOfTheCenterlineNearer
   startAnew(bench);
   bench.speed = 9.0;
   bench.drive();
-  const double before = bench.cycles(200).command.speed;
+  const double before = bench.cycles(1000).command.speed;
   bench.give_scan = false;
   const Decision& decision = bench.cycles(4);
   EXPECT_EQ(decision.limited_by, SpeedLimit::kSight);
