@@ -449,6 +449,21 @@ TEST(ArbiterEdge, AfterAClockJumpTheTruckTurnsAsItsHingeSaysUntilSeenOtherwise) 
   EXPECT_NEAR(bench.cycles(3).corridor_left.back().y(), endOfCorridor(1.0), 0.01);
 }
 
+// The centerline stays where it was measured, though the truck and what it sees turn away from it.
+TEST(ArbiterEdge, WithoutANewCenterlineTheWayIsExpectedAlongTheOneLastMeasured) {
+  const auto endOfCorridorTurnedBy = [](double turn) {
+    ArbiterBench bench;
+    bench.drive();
+    bench.tunnel_valid = false;
+    for (int cycle = 0; cycle < 6; ++cycle) {
+      bench.motion.pose.heading += turn / 6.0;
+      bench.cycle();
+    }
+    return bench.cycle().corridor_left.back().y();
+  };
+  EXPECT_LT(endOfCorridorTurnedBy(0.12), endOfCorridorTurnedBy(0.0) - 0.1) << "back to the right";
+}
+
 TEST(ArbiterEdge, AHeldArticulationIsOfTheTimeOfTheLastMotionAndWithoutAnyOfNone) {
   ArbiterBench bench;
   EXPECT_EQ(bench.arbiter->decide(bench.now).command.stamp, Stamp{});
