@@ -144,11 +144,11 @@ void LapMonitor::finish(const std::string& failure) {
   }
   passed_ = reason.empty();
   if (!*passed_) figures["reason"] = reason;
-  const std::string line = (*passed_ ? "PASS " : "FAIL ") + figures.dump();
+  verdict_ = (*passed_ ? "PASS " : "FAIL ") + figures.dump();
   std::ofstream file;
   if (verdict_file_ != kStandardOutput) file.open(verdict_file_);
-  if (!file.is_open() || !(file << line << "\n").flush()) {
-    std::printf("%s\n", line.c_str());
+  if (!file.is_open() || !(file << verdict_ << "\n").flush()) {
+    std::printf("%s\n", verdict_.c_str());
     std::fflush(stdout);
   }
   ros::requestShutdown();

@@ -41,6 +41,9 @@ class LapMonitor {
   /// The verdict, once there is one.
   std::optional<bool> passed() const { return passed_; }
 
+  /// The verdict as it was printed; empty until there is one.
+  const std::string& verdict() const { return verdict_; }
+
   /// Figures of the drive so far (simulation::driveMetrics) and its lap_time [s].
   simulation::Metrics metrics() const;
 
@@ -69,6 +72,7 @@ class LapMonitor {
   std::optional<SimulatorTruth> first_, last_;
   std::vector<simulation::TrackSample> track_;
   std::optional<bool> passed_;
+  std::string verdict_;
 };
 
 }  // namespace tunnel_pilot::shell
