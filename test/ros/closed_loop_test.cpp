@@ -75,9 +75,10 @@ TEST(ClosedLoop, DrivesOneLapAsWellAsWithoutRos) {
   const auto without = lapsWithoutRos(by_network ? simulation::DriverChoice::kAll
                                                  : simulation::DriverChoice::kPreviewDriver);
   ASSERT_EQ(1.0, without.at("completed").front());
-  EXPECT_GT(steering.share(by_network ? TruckCommand::SOURCE_LIDAR_DRIVER
-                                      : TruckCommand::SOURCE_PREVIEW_DRIVER),
-            0.9);
+  const double share = steering.share(by_network ? TruckCommand::SOURCE_LIDAR_DRIVER
+                                                 : TruckCommand::SOURCE_PREVIEW_DRIVER);
+  EXPECT_GT(share, 0.9);
+  RecordProperty("share", std::to_string(share));
   for (const char* figure : {"lateral_mean", "lateral_rms"}) {
     expectAlike(with_ros.at(figure), median(without.at(figure)), figure);
   }
@@ -86,6 +87,7 @@ TEST(ClosedLoop, DrivesOneLapAsWellAsWithoutRos) {
   for (const char* figure : {"lateral_max", "clearance_min"}) {
     const auto& values = without.at(figure);
     const double value = with_ros.at(figure);
+    RecordProperty(figure, std::to_string(values.front()) + " to " + std::to_string(values.back()));
     expectAlike(value, std::clamp(value, values.front(), values.back()), figure);
   }
   EXPECT_NEAR(median(without.at("heading_mean")), with_ros.at("heading_mean"), 0.01);  // [rad]
