@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tunnel_pilot/bridge/safety_state.h"
+#include "tunnel_pilot/ros/conversions.h"
 #include "tunnel_pilot/ros/parameters.h"
 
 namespace tunnel_pilot::shell {
@@ -21,6 +22,11 @@ constexpr double kDegrees = 57.29577951308232;
 
 // Figures are told to a tenth of a millimetre; more digits would be noise.
 double rounded(double value) { return std::round(value * 1e4) / 1e4; }
+
+// [s] between two messages' stamps, however far apart: beyond 68 years ros::Time throws.
+double between(const SimulatorTruth& earlier, const SimulatorTruth& later) {
+  return toSeconds(shell::toCore(later.header.stamp) - shell::toCore(earlier.header.stamp));
+}
 
 double since(ros::SteadyTime time) { return (ros::SteadyTime::now() - time).toSec(); }
 
@@ -99,7 +105,7 @@ void LapMonitor::checkLap(const SimulatorTruth& message) {
   if (!first_ && message.header.stamp < lap_begin_) return;
   if (!first_) first_ = message;
   track_.push_back(toSample(message));
-  const double time = (message.header.stamp - first_->header.stamp).toSec();
+  const double time = between(*first_, message);
   if (!message.on_design_line || message.lap_length <= 0.0) {
     return finish("the world has no design line to drive a lap of");
   }
@@ -113,16 +119,15 @@ void LapMonitor::printProgress() const {
     std::printf("waiting to be engaged: %s\n", refusal_.c_str());
   } else {
     std::printf("lap %3.0f %%  %5.1f s  %4.2f m/s  offset %+5.2f m  clearance %4.2f m  %s\n",
-                100.0 * (last_->station - first_->station) / last_->lap_length,
-                (last_->header.stamp - first_->header.stamp).toSec(), last_->speed,
-                last_->lateral_offset, last_->clearance, reason_.c_str());
+                100.0 * (last_->station - first_->station) / last_->lap_length, between(*first_, *last_),
+                last_->speed, last_->lateral_offset, last_->clearance, reason_.c_str());
   }
   std::fflush(stdout);
 }
 
 simulation::Metrics LapMonitor::metrics() const {
   auto metrics = simulation::driveMetrics(track_, geometry::Path());
-  if (first_ && last_) metrics["lap_time"] = (last_->header.stamp - first_->header.stamp).toSec();
+  if (first_ && last_) metrics["lap_time"] = between(*first_, *last_);
   return metrics;
 }
 

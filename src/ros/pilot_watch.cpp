@@ -10,6 +10,7 @@
 
 #include <algorithm>
 
+#include "tunnel_pilot/ros/conversions.h"
 #include "tunnel_pilot/ros/pilot_nodes.h"
 
 namespace tunnel_pilot::shell {
@@ -58,12 +59,13 @@ PilotWatch::PilotWatch(ros::NodeHandle nh) : nh_(nh) {
 template <class Message>
 void PilotWatch::count(const std::string& topic) {
   const boost::function<void(const Message&)> arrived = [this, topic](const Message& message) {
-    const ros::Time now = ros::Time::now();
+    const ros::Time time = ros::Time::now();
     Arrivals& arrivals = arrivals_[topic];
-    if (!arrivals.first) arrivals.first = now;
-    arrivals.last = now;
+    if (!arrivals.first) arrivals.first = time;
+    arrivals.last = time;
     ++arrivals.count;
-    arrivals.ages.push_back((now - message.header.stamp).toSec());
+    // The core's stamps: ros::Time throws where two are more than 68 years apart.
+    arrivals.ages.push_back(toSeconds(toCore(time) - toCore(message.header.stamp)));
     if (const std::string frame = frameOf(message); !frame.empty()) facts_.lidar_frame = frame;
   };
   subscribers_.push_back(nh_.subscribe<Message>(topic, kQueue, arrived, ros::VoidConstPtr(),

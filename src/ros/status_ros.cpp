@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "tunnel_pilot/ros/conversions.h"
 #include "tunnel_pilot/ros/parameters.h"
 
 namespace tunnel_pilot::shell {
@@ -13,9 +14,11 @@ namespace {
 constexpr double kTick = 0.05;   // [s] steady time
 constexpr double kSilent = 1.0;  // what is older is not told any more [s]
 
+// In the core's stamps: ros::Time throws where two are more than 68 years apart, and a message may say
+// anything.
 std::optional<double> ageOf(const std::optional<ros::Time>& stamp) {
   if (!stamp) return std::nullopt;
-  return std::max(0.0, (ros::Time::now() - *stamp).toSec());
+  return std::max(0.0, toSeconds(now() - shell::toCore(*stamp)));
 }
 
 }  // namespace

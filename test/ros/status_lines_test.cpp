@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <ros/network.h>
 #include <ros/ros.h>
+#include <sensor_msgs/LaserScan.h>
 #include <std_srvs/Trigger.h>
 #include <sys/wait.h>
 #include <tunnel_pilot/SimulatorTruth.h>
@@ -27,9 +28,9 @@ std::string programOf(const std::string& name) {
 }
 
 // Runs self_check; its exit status and what it said.
-std::pair<int, std::string> selfCheck() {
+std::pair<int, std::string> selfCheck(const std::string& remapping = "") {
   std::string output;
-  FILE* pipe = popen(("'" + programOf("self_check") + "' 2>&1").c_str(), "r");
+  FILE* pipe = popen(("'" + programOf("self_check") + "' " + remapping + " 2>&1").c_str(), "r");
   if (pipe == nullptr) return {-1, ""};
   char buffer[4096];
   while (std::fgets(buffer, sizeof buffer, pipe) != nullptr) output += buffer;
@@ -40,7 +41,7 @@ std::pair<int, std::string> selfCheck() {
 // The program `status`, running, with what it said in a file.
 class StatusProgram {
  public:
-  StatusProgram()
+  explicit StatusProgram(const std::string& remapping = "unused:=unused")
       : file_(std::filesystem::temp_directory_path() / ("status_lines_" + std::to_string(getpid()))) {
     const std::string name = std::string("__name:=") + (kStatusNode + 1);
     const std::string program = programOf("status");
@@ -48,7 +49,7 @@ class StatusProgram {
     if (process_ != 0) return;
     const int out = open(file_.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
     dup2(out, STDOUT_FILENO);
-    execl(program.c_str(), program.c_str(), name.c_str(), nullptr);
+    execl(program.c_str(), program.c_str(), name.c_str(), remapping.c_str(), nullptr);
     _exit(127);
   }
   ~StatusProgram() {
@@ -65,6 +66,11 @@ class StatusProgram {
     return text.str();
   }
   bool says(const std::string& words) const { return output().find(words) != std::string::npos; }
+  bool runs() const {
+    siginfo_t info{};
+    return waitid(P_PID, static_cast<id_t>(process_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+           info.si_pid == 0;
+  }
 
  private:
   std::filesystem::path file_;
@@ -143,6 +149,22 @@ TEST_F(StatusLinesTest, StatusTellsInPlainLinesHowTheTruckDrives) {
     return status.says("ACTIVE, autonomous: driving as asked | lidar driver, network lidar_driver ");
   })) << status.output();
   EXPECT_FALSE(status.says("\033")) << "colours in a file";
+}
+
+// ros::Time throws where two are more than 68 years apart.
+TEST_F(StatusLinesTest, AScanOfTheFarFutureEndsNeitherStatusNorSelfCheck) {
+  const char* remapping = "scan:=scan_of_the_future";
+  ros::Publisher publisher = nh_.advertise<sensor_msgs::LaserScan>("scan_of_the_future", 1, true);
+  sensor_msgs::LaserScan scan;
+  scan.header.stamp = ros::TIME_MAX;
+  publisher.publish(scan);
+  const StatusProgram status(remapping);
+  ASSERT_TRUE(spinUntil([&] { return publisher.getNumSubscribers() > 0; }));
+  spinUntil([] { return false; }, 0.5);
+  EXPECT_TRUE(status.runs());
+  const auto [code, output] = selfCheck(remapping);
+  EXPECT_EQ(1, code) << output;
+  EXPECT_NE(std::string::npos, output.find("FAIL  scan: ")) << output;
 }
 
 TEST_F(StatusLinesTest, ADeadLidarIsToldWithinASecondInTheArbitersWords) {
