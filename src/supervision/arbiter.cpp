@@ -113,7 +113,7 @@ void Arbiter::setTruckState(const TruckState& state, Stamp now) {
   seen_.truck_state_received = now;
   const bool at_rest = !state.engaged && !state.stopping;
   standby_seen_ = standby_seen_ || at_rest;
-  if (at_rest && latched_ && age(latched_at_, now) > parameters_.recovery_time) latched_.reset();
+  if (at_rest && latched_ && age(seen_.latched_at, now) > parameters_.recovery_time) latched_.reset();
 }
 
 bool Arbiter::selectDriver(Source driver) {
@@ -133,7 +133,7 @@ bool Arbiter::selectDriver(Source driver) {
 
 void Arbiter::requestStop(Stamp now) {
   latched_ = Reason::kOperatorStop;
-  latched_at_ = now;
+  seen_.latched_at = now;
 }
 
 bool Arbiter::reset(Stamp now) {
@@ -144,10 +144,7 @@ bool Arbiter::reset(Stamp now) {
 }
 
 void Arbiter::clockJumped() {
-  if (engaged() && !latched_) {
-    latched_ = Reason::kClockJump;
-    latched_at_.reset();
-  }
+  if (engaged() && !latched_) latched_ = Reason::kClockJump;
   seen_ = {};
   history_.clear();
   forgetPlaces();
@@ -450,7 +447,7 @@ void Arbiter::latch(Findings& findings, Stamp now) {
   const bool counts = findings.stop != Reason::kStartUp || parameters_.needs_truck_state;
   if (engaged() && findings.stop != Reason::kNone && counts && !latched_) {
     latched_ = findings.stop;
-    latched_at_ = now;
+    seen_.latched_at = now;
   }
   if (latched_) findings.stop = *latched_;
 }

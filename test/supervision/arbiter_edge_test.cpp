@@ -560,6 +560,37 @@ TEST(ArbiterEdge, WithoutWallChecksAScanThatStaysAwayStopsAllTheSame) {
   EXPECT_EQ(decision.command.reason, Reason::kScanStale);
 }
 
+TEST(ArbiterEdge, WithoutWallChecksScansOfLongAgoStopHoweverManyCome) {
+  ArbiterBench bench;
+  bench.parameters.wall_checks = false;
+  startAnew(bench);
+  bench.drive();
+  bench.latency = fromSeconds(bench.parameters.scan_stop_age) + milliseconds(40);
+  bench.give_proposal = false;
+  bench.inputs();
+  const Stamp measured = bench.now;  // a driver that needs no scan
+  bench.arbiter->setProposal(
+      Source::kPreviewDriver,
+      [&] {
+        drivers::Proposal proposal = bench.proposal();
+        proposal.stamp = measured;
+        return proposal;
+      }(),
+      bench.now);
+  const Decision& decision = bench.arbiter->decide(bench.now);
+  EXPECT_TRUE(decision.command.stop);
+  EXPECT_EQ(decision.command.reason, Reason::kScanStale);
+}
+
+TEST(ArbiterEdge, AStoppingTrucksReasonIsToldHoweverSlight) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.state = {true, true, Reason::kNotEngaged};
+  const Decision& decision = bench.cycle();
+  EXPECT_TRUE(decision.command.stop);
+  EXPECT_EQ(decision.command.reason, Reason::kNotEngaged);
+}
+
 TEST(ArbiterEdge, AnObstacleIsToldAsOneAmongScansThatShowTooLittleRoom) {
   ArbiterBench bench;
   bench.parameters.wall_scans = 2;
@@ -620,6 +651,18 @@ TEST(ArbiterEdge, AClockThatJumpsInAStopLeavesItsReason) {
   EXPECT_EQ(bench.cycles(10).command.reason, Reason::kOperatorStop);
 }
 
+TEST(ArbiterEdge, AfterAClockThatJumpedBackAStopDoesNotOutlastTheTrucksReset) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.arbiter->requestStop(bench.now);
+  bench.cycle();
+  bench.now -= std::chrono::hours(1);
+  bench.cycle();
+  bench.state = {false, false, Reason::kNotEngaged};
+  const int cycles = static_cast<int>(bench.parameters.recovery_time / 0.02);
+  EXPECT_FALSE(bench.cycles(cycles + 5).command.stop);
+}
+
 // ---- speed
 
 TEST(ArbiterEdge, WithoutWallChecksTheEndOfTheCenterlineLimitsTheSpeed) {
@@ -646,6 +689,17 @@ TEST(ArbiterEdge, WithoutWallChecksTheWayDrivenBringsTheEndOfTheCenterlineNearer
   const Decision& decision = bench.cycles(4);
   EXPECT_EQ(decision.limited_by, SpeedLimit::kSight);
   EXPECT_LT(decision.command.speed, before);
+}
+
+TEST(ArbiterEdge, ATopSpeedIsALimitOfNothingElse) {
+  ArbiterBench bench;
+  bench.parameters.governor.max_speed = 1.0;
+  startAnew(bench);
+  bench.motion.speed = 1.0;
+  bench.drive();
+  const Decision& decision = bench.cycle();
+  EXPECT_EQ(decision.speed_limit, 1.0);
+  EXPECT_EQ(decision.limited_by, SpeedLimit::kNone);
 }
 
 TEST(ArbiterEdge, ADegradedDriveIsNoFasterThanItsDriverWants) {
@@ -721,6 +775,19 @@ TEST(ArbiterEdge, LimitsHitWhileNobodyIsEngagedDoNotCount) {
   bench.wanted = 0.0;
   bench.state = {true, false, Reason::kNone};
   EXPECT_FALSE(bench.cycle().degraded);
+}
+
+TEST(ArbiterEdge, LimitsHitLongAgoDoNotCount) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.wanted = 0.9;
+  const int hits = bench.parameters.limit_hits - 1;
+  EXPECT_FALSE(bench.cycles(hits).degraded);
+  bench.wanted = 0.0;
+  bench.cycles(static_cast<int>(bench.parameters.recovery_time / 0.02) + 2);
+  bench.wanted = 0.9;
+  EXPECT_FALSE(bench.cycles(hits + 1).degraded);  // told one cycle after the last
+  EXPECT_TRUE(bench.cycle().degraded);
 }
 
 TEST(Codes, ExactlyThoseThatHaveWordsAreKnown) {

@@ -189,6 +189,7 @@ class Arbiter {
     std::array<Slot, 9> slots;  ///< by Source
     std::optional<Stamp> scan_received, rejection_received;
     std::optional<Stamp> gap_ended;  ///< when the last scan that was late came
+    std::optional<Stamp> latched_at;
     std::optional<Stamp> tunnel_received, tunnel_valid_received;
     std::optional<Stamp> motion_received;
     std::optional<Stamp> truck_state_received;
@@ -267,7 +268,6 @@ class Arbiter {
   Decision decision_;
   bool started_ = false;  ///< the limiter knows where the articulation stands
   std::optional<Reason> latched_;
-  std::optional<Stamp> latched_at_;
   Reason slow_reason_ = Reason::kNone;
   SpeedLimit waits_for_ = SpeedLimit::kNone;  ///< what the truck stands before
 };
