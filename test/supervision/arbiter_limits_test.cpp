@@ -202,6 +202,26 @@ TEST(ArbiterLimits, AnArbiterThatFindsATruckUnderWaySaysThatItStartsUp) {
   EXPECT_EQ(bench.cycle().command.reason, Reason::kStartUp);
 }
 
+TEST(ArbiterLimits, ATruckThatStoodAtTheEndOfSightDrivesOnWhenItHasSeenFurtherForAWhile) {
+  ArbiterBench bench;
+  bench.motion.speed = 0.0;
+  bench.drive();
+  bench.give_scan = false;
+  for (int i = 0; i < 5; ++i) {
+    bench.scene = sceneAt(bench.line, {20.0, 0.0, 0.0}, 5.0, bench.now, 3.0);
+    bench.arbiter->setPoints(bench.scene.points, bench.now, bench.now);
+    bench.arbiter->setWalls(bench.scene.walls, bench.now);
+    bench.arbiter->setTunnel(bench.scene.tunnel, bench.now);
+    bench.cycle();
+  }
+  bench.give_scan = true;
+  const Decision& decision = bench.cycles(30);
+  EXPECT_EQ(decision.limited_by, SpeedLimit::kSight);
+  EXPECT_LT(decision.command.speed, 0.05);
+  bench.cycles(static_cast<int>(bench.parameters.recovery_time / 0.02));
+  EXPECT_GT(bench.cycle().command.speed, 0.05);
+}
+
 // ---- what counts once
 
 TEST(ArbiterLimits, AScanOfAnObstacleCountsOnceHoweverManyDecisionsFollow) {
