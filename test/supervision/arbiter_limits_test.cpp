@@ -60,7 +60,12 @@ TEST(ArbiterLimits, MotionStopsBeyondItsAge) {
 }
 
 TEST(ArbiterLimits, AMeasurementStopsBeyondItsAge) {
-  expectLimit([](auto& p) { p.max_stamp_age = kLimit; }, Reason::kMotionStale);
+  expectLimit(
+      [](auto& p) {
+        p.max_stamp_age = kLimit;
+        for (SourceRule& rule : p.sources) rule.max_age = kLimit + 0.01;
+      },
+      Reason::kMotionStale);
 }
 
 TEST(ArbiterLimits, TheTruckStopsBeyondItsAge) {
@@ -123,14 +128,6 @@ TEST(ArbiterLimits, DriversThatTurnAlikeDoNotDisagree) {
   EXPECT_NE(bench.arbiter->decide(bench.now).command.reason, Reason::kDriversDisagree);
 }
 
-TEST(ArbiterLimits, ADriverThatHasFallenSilentDisagreesWithNobody) {
-  ArbiterBench bench;
-  bench.drive();
-  bench.arbiter->setProposal(Source::kLidarDriver,
-                             bench.proposal(bench.parameters.disagreement_angle + 0.1), bench.now);
-  EXPECT_FALSE(bench.cycles(30).degraded);
-}
-
 TEST(ArbiterLimits, AStopEndsBeyondTheRecoveryTime) {
   for (const bool beyond : {false, true}) {
     ArbiterBench bench = driving([](auto& p) { p.recovery_time = kLimit; });
@@ -159,6 +156,46 @@ TEST(ArbiterLimits, RejectionsCountForTwiceAScansAge) {
     bench.arbiter->setRejection({false}, bench.now);
     const Reason reason = bench.arbiter->decide(bench.now + kExactly + after).command.reason;
     EXPECT_EQ(reason, after == Stamp::zero() ? Reason::kScanRejected : Reason::kScanStale);
+  }
+}
+
+TEST(ArbiterLimits, AStopIsSteeredAlongACenterlineUpToItsAge) {
+  for (const bool beyond : {false, true}) {
+    ArbiterBench bench = driving([](auto& p) {
+      p.dead_reckoning_age = kLimit;
+      for (SourceRule& rule : p.sources) rule.max_age = 0.1;
+    });
+    const Stamp then = bench.now + kExactly + (beyond ? kMoment : Stamp(0));
+    EXPECT_EQ(bench.arbiter->decide(then).command.source,
+              beyond ? Source::kHold : Source::kDeadReckoning);
+  }
+}
+
+TEST(ArbiterLimits, AfterTheRecoveryTimeTheTruckIsSlowNoLonger) {
+  for (const bool before : {false, true}) {
+    ArbiterBench bench = driving([](auto& p) { p.recovery_time = kLimit; });
+    drivers::Proposal proposal = bench.proposal();
+    proposal.confidence = 0.0;
+    bench.arbiter->setProposal(Source::kLidarDriver, proposal, bench.now);
+    ASSERT_TRUE(bench.arbiter->decide(bench.now).degraded);
+    proposal.confidence = 1.0;
+    bench.arbiter->setProposal(Source::kLidarDriver, proposal, bench.now);
+    const Stamp then = bench.now + kExactly - (before ? kMoment : Stamp(0));
+    EXPECT_EQ(bench.arbiter->decide(then).degraded, before);
+  }
+}
+
+TEST(ArbiterLimits, LimitsHitCountWhenNoFurtherApartThanTheRecoveryTime) {
+  for (const bool further : {false, true}) {
+    ArbiterBench bench = driving([](auto& p) {
+      p.recovery_time = kLimit;
+      p.limit_hits = 2;
+    });
+    bench.wanted = 0.9;
+    bench.cycle();
+    const Stamp then = bench.now + kExactly + (further ? kMoment : Stamp(0));
+    bench.arbiter->decide(then);
+    EXPECT_EQ(bench.arbiter->decide(then).degraded, !further);
   }
 }
 
@@ -202,10 +239,8 @@ TEST(ArbiterLimits, AnArbiterThatFindsATruckUnderWaySaysThatItStartsUp) {
   EXPECT_EQ(bench.cycle().command.reason, Reason::kStartUp);
 }
 
-TEST(ArbiterLimits, ATruckThatStoodAtTheEndOfSightDrivesOnWhenItHasSeenFurtherForAWhile) {
-  ArbiterBench bench;
-  bench.motion.speed = 0.0;
-  bench.drive();
+// Five cycles of 3 m of sight, then 25 m again.
+void loseSight(ArbiterBench& bench) {
   bench.give_scan = false;
   for (int i = 0; i < 5; ++i) {
     bench.scene = sceneAt(bench.line, {20.0, 0.0, 0.0}, 5.0, bench.now, 3.0);
@@ -214,12 +249,41 @@ TEST(ArbiterLimits, ATruckThatStoodAtTheEndOfSightDrivesOnWhenItHasSeenFurtherFo
     bench.arbiter->setTunnel(bench.scene.tunnel, bench.now);
     bench.cycle();
   }
+  EXPECT_EQ(bench.arbiter->decide(bench.now).limited_by, SpeedLimit::kSight);
   bench.give_scan = true;
+}
+
+TEST(ArbiterLimits, ATruckThatStoodAtTheEndOfSightDrivesOnWhenItHasSeenFurtherForAWhile) {
+  ArbiterBench bench;
+  bench.motion.speed = 0.0;
+  bench.drive();
+  loseSight(bench);
   const Decision& decision = bench.cycles(30);
   EXPECT_EQ(decision.limited_by, SpeedLimit::kSight);
   EXPECT_LT(decision.command.speed, 0.05);
   bench.cycles(static_cast<int>(bench.parameters.recovery_time / 0.02));
   EXPECT_GT(bench.cycle().command.speed, 0.05);
+}
+
+TEST(ArbiterLimits, ATruckThatMovesAtTheEndOfSightDrivesOnAtOnce) {
+  for (const double speed : {0.05, 1.0}) {
+    ArbiterBench bench;
+    bench.motion.speed = speed;
+    bench.drive();
+    loseSight(bench);
+    EXPECT_NE(bench.cycles(3).limited_by, SpeedLimit::kSight) << speed;
+  }
+}
+
+TEST(ArbiterLimits, ADriverThatHasFallenSilentDisagreesWithNobodyWhoeverSteers) {
+  ArbiterBench bench;
+  bench.drive();
+  bench.arbiter->setProposal(Source::kLidarDriver,
+                             bench.proposal(bench.parameters.disagreement_angle + 0.1), bench.now);
+  for (int i = 0; i < 30; ++i) {
+    bench.arbiter->setProposal(Source::kTeleoperation, bench.proposal(), bench.now);
+    EXPECT_FALSE(bench.cycle().degraded) << i;
+  }
 }
 
 // ---- what counts once
