@@ -18,7 +18,7 @@ namespace tunnel_pilot::shell {
 namespace {
 
 // Within 20 % or 0.02 m.
-void expectAlike(double with_ros, double without, const std::string& what) {
+void expectAlike(double with_ros, double without, const char* what) {
   EXPECT_NEAR(without, with_ros, std::max(0.2 * std::abs(without), 0.02)) << what;
 }
 

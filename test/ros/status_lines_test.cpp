@@ -41,7 +41,7 @@ std::pair<int, std::string> selfCheck(const std::string& remapping = "") {
 // The program `status`, running, with what it said in a file.
 class StatusProgram {
  public:
-  explicit StatusProgram(const std::string& remapping = "unused:=unused")
+  explicit StatusProgram(const std::string& remapping = "")
       : file_(std::filesystem::temp_directory_path() / ("status_lines_" + std::to_string(getpid()))) {
     const std::string name = std::string("__name:=") + (kStatusNode + 1);
     const std::string program = programOf("status");
@@ -49,7 +49,8 @@ class StatusProgram {
     if (process_ != 0) return;
     const int out = open(file_.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
     dup2(out, STDOUT_FILENO);
-    execl(program.c_str(), program.c_str(), name.c_str(), remapping.c_str(), nullptr);
+    const char* last = remapping.empty() ? nullptr : remapping.c_str();
+    execl(program.c_str(), program.c_str(), name.c_str(), last, nullptr);
     _exit(127);
   }
   ~StatusProgram() {

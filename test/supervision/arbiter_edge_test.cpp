@@ -275,6 +275,30 @@ TEST(ArbiterEdge, AfterAJumpNoStopIsSteeredAlongACenterlineOfTheOldFrame) {
   EXPECT_EQ(bench.cycle().command.source, Source::kHold);
 }
 
+TEST(ArbiterEdge, AfterAJumpNoWayIsExpectedAlongACenterlineOfTheOldFrame) {
+  const auto endOfCorridor = [](bool jumps) {
+    ArbiterBench bench;
+    bench.line = geometry::buildPath({{20.0, 0.0, 0.0}, {40.0, 0.05, 0.05}}, {}, 0.5);
+    bench.drive();
+    bench.tunnel_valid = false;
+    if (jumps) jump(bench, {0.0, 0.0, 1.0});
+    return bench.cycle().corridor_left.back().y();
+  };
+  EXPECT_GT(endOfCorridor(false), 2.0) << "along the bend";
+  EXPECT_LT(endOfCorridor(true), 1.6) << "as the hinge stands";
+}
+
+TEST(ArbiterEdge, WithoutMotionNoStoppingDistanceIsKnown) {
+  ArbiterBench bench;
+  bench.give_motion = false;
+  EXPECT_TRUE(std::isnan(bench.cycle().stopping_distance));
+  bench.give_motion = true;
+  EXPECT_GT(bench.cycle().stopping_distance, 0.0);
+  bench.give_motion = false;
+  bench.arbiter->clockJumped();
+  EXPECT_TRUE(std::isnan(bench.cycle().stopping_distance));
+}
+
 TEST(ArbiterEdge, MotionThatWasMeasuredLongAgoIsStale) {
   ArbiterBench bench;
   bench.drive();
